@@ -1,0 +1,1 @@
+//! Images, reports and the command line of luxel.

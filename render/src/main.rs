@@ -1,0 +1,2 @@
+//! The luxel command.
+fn main() {}

@@ -1,0 +1,21 @@
+//! Scenes for luxel: faces, materials, textures, lights and cameras; the readers that make them
+//! (OBJ/MTL, glTF, scene TOML) and generators of scenes whose answer is known.
+//!
+//! A [`Scene`] is plain data in world space, in metres, right-handed. It knows nothing of rays,
+//! patches or solving.
+
+pub mod camera;
+pub mod id;
+pub mod light;
+pub mod material;
+pub mod radiometry;
+pub mod scene;
+
+pub use camera::{Camera, FieldOfView, Projection};
+pub use id::{FaceId, MaterialId, ObjectId, TextureId};
+pub use light::{Light, LightKind, Sky};
+pub use material::{Material, Sidedness, Specular, Texture};
+pub use radiometry::{
+    Exitance, Flux, Intensity, Irradiance, Radiance, Radiosity, Reflectance, Rgb,
+};
+pub use scene::{Corners, Face, Object, Scene, UnitSystem};

@@ -1,0 +1,95 @@
+//! Lights that are not surfaces: point, spot, directional, sky and environment.
+//!
+//! Emissive faces are not listed here: their emission is a property of their material.
+
+use crate::id::TextureId;
+use crate::radiometry::{Intensity, Irradiance, Radiance};
+use glam::DVec3;
+
+/// A named light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Light {
+    /// Its name in the file, or its kind and number.
+    pub name: String,
+    /// What it is.
+    pub kind: LightKind,
+}
+
+/// The kinds of light.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LightKind {
+    /// An isotropic point source.
+    Point {
+        /// Position in metres.
+        position: DVec3,
+        /// Intensity in W/sr, the same in all directions.
+        intensity: Intensity,
+    },
+    /// A point source that shines into a cone, as `KHR_lights_punctual` defines it: full intensity
+    /// inside `inner_angle`, smooth to zero at `outer_angle`.
+    Spot {
+        /// Position in metres.
+        position: DVec3,
+        /// Unit vector in which the spot shines.
+        direction: DVec3,
+        /// Intensity on the axis in W/sr.
+        intensity: Intensity,
+        /// Angle from the axis, in radians, up to which the intensity is full.
+        inner_angle: f64,
+        /// Angle from the axis, in radians, from which it is zero.
+        outer_angle: f64,
+    },
+    /// Parallel light from infinitely far away.
+    Directional {
+        /// Unit vector in which the light travels.
+        direction: DVec3,
+        /// Irradiance in W/m² on a surface that faces the light.
+        irradiance: Irradiance,
+    },
+    /// Radiance of the sky by formula.
+    Sky {
+        /// The formula.
+        sky: Sky,
+        /// Unit vector to the zenith. Directions below the horizon carry no light.
+        up: DVec3,
+    },
+    /// Radiance from an image of all directions (latitude–longitude, top row at the zenith).
+    Environment {
+        /// The image.
+        texture: TextureId,
+        /// Radiance in W/(m² sr) of an image value of one.
+        scale: Radiance,
+        /// Rotation about `up`, in radians.
+        rotation: f64,
+        /// Unit vector to the top of the image.
+        up: DVec3,
+    },
+}
+
+/// Sky models, radiance over the upper hemisphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sky {
+    /// The same radiance everywhere.
+    Uniform {
+        /// Radiance in W/(m² sr).
+        radiance: Radiance,
+    },
+    /// CIE (Moon–Spencer) overcast sky: L(γ) = Lz (1 + 2 sin γ) / 3 at altitude γ.
+    CieOvercast {
+        /// Radiance at the zenith in W/(m² sr).
+        zenith: Radiance,
+    },
+}
+
+impl Sky {
+    /// Radiance from the direction whose sine of altitude is `sin_altitude`; zero below the horizon.
+    pub fn radiance(self, sin_altitude: f64) -> Radiance {
+        if sin_altitude < 0.0 {
+            return Radiance::ZERO;
+        }
+        match self {
+            Self::Uniform { radiance } => radiance,
+            Self::CieOvercast { zenith } => zenith * ((1.0 + 2.0 * sin_altitude) / 3.0),
+        }
+    }
+}

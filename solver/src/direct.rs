@@ -1,0 +1,1 @@
+//! Direct light at a point.

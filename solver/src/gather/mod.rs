@@ -1,0 +1,1 @@
+//! The final gather of irradiance.

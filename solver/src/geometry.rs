@@ -1,0 +1,1 @@
+//! The scene as rays see it: triangles in a frame of unit size.

@@ -1,0 +1,21 @@
+//! Light transport: from a [`luxel_scenes::Scene`] to radiosity, irradiance and form factors.
+//!
+//! The modules stand in the order in which light passes through them.
+
+pub mod sampling;
+
+pub mod geometry;
+
+pub mod bvh;
+
+pub mod patches;
+
+pub mod form_factors;
+
+pub mod transport;
+
+pub mod solvers;
+
+pub mod direct;
+
+pub mod gather;

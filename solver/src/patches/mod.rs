@@ -1,0 +1,1 @@
+//! Patches: the pieces of surface that carry one radiosity each.

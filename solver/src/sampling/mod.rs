@@ -1,0 +1,1 @@
+//! Sample points and the warps that turn them into directions and positions.

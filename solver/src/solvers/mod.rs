@@ -1,0 +1,1 @@
+//! Solvers of the radiosity system B = S + rho F B.

@@ -1,0 +1,1 @@
+//! Transport operators: E = F B.
