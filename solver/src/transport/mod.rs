@@ -1,1 +1,47 @@
-//! Transport operators: E = F B.
+//! Transport operators: E = F B, light gathered over all unknowns.
+//!
+//! An unknown is one side of a patch. F_ij is the fraction of the flux leaving i that arrives at j,
+//! so that a row gathers: E_i = Σ_j F_ij B_j. Solvers see an operator through [`Transport`] only.
+
+mod dense;
+
+pub use dense::{Dense, DenseError};
+
+use luxel_scenes::{Irradiance, Radiosity};
+use nalgebra::DMatrix;
+
+/// The linear operator E = F B on the unknowns 0..len.
+///
+/// All three channels share one F. Implementations are deterministic: the same input gives the same
+/// bits at any thread count, which asks for disjoint outputs and sums in a fixed order, and
+/// [`Transport::gather`] and [`Transport::gather_row`] agree to the bit.
+pub trait Transport: Sync {
+    /// Number of unknowns.
+    fn len(&self) -> usize;
+
+    /// True without unknowns.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// E = F B over all rows, in parallel; radiosity and irradiance in W/m².
+    ///
+    /// # Panics
+    /// When the slices are not [`Transport::len`] long.
+    fn gather(&self, radiosity: &[Radiosity], irradiance: &mut [Irradiance]);
+
+    /// E_i = Σ_j F_ij B_j of one row in W/m²: what Gauss–Seidel needs.
+    ///
+    /// # Panics
+    /// When `row` is out of range or the slice is not [`Transport::len`] long.
+    fn gather_row(&self, row: usize, radiosity: &[Radiosity]) -> Irradiance;
+
+    /// F_ii, zero for planar patches.
+    fn coupling(&self, row: usize) -> f64;
+
+    /// Σ_j F_ij: one in a closed scene, less where light escapes.
+    fn row_sum(&self, row: usize) -> f64;
+
+    /// F as a matrix, for direct solvers and comparison; n² numbers.
+    fn to_dense(&self) -> DMatrix<f64>;
+}
