@@ -1,1 +1,16 @@
 //! Images, reports and the command line of luxel.
+//!
+//! This crate turns what the solver knows into something to look at or to read: camera rays and
+//! a [`film`], image files, tables of probes and form factors, and the `luxel` command ([`cli`]).
+//! It holds no transport algorithm of its own besides the image integrators.
+
+pub mod camera;
+pub mod diff;
+pub mod files;
+pub mod film;
+pub mod image;
+pub mod matrix;
+pub mod ply;
+pub mod points;
+pub mod progress;
+pub mod tone_map;

@@ -1,0 +1,164 @@
+//! Output files: checked before the work, written whole or not at all.
+//!
+//! [`Output::prepare`] finds out before the long work starts whether the file can be written;
+//! [`Output::write`] writes a temporary file in the same folder and renames it, so that a reader
+//! never sees half a file and an old file survives a failure. Special files (`/dev/stdout`, a
+//! pipe) cannot be renamed onto and are written in place.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Why an output file cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// The folder is missing.
+    #[error("cannot write {}: its folder does not exist; create it first: mkdir -p {}", .path.display(), .folder.display())]
+    NoFolder {
+        /// The file.
+        path: PathBuf,
+        /// Its folder.
+        folder: PathBuf,
+    },
+    /// The path names a folder.
+    #[error("cannot write {}: it is a folder; name a file in it", .0.display())]
+    IsFolder(PathBuf),
+    /// The system refused.
+    #[error("cannot write {}; check the folder's permissions and the free space, or choose another path", .0.display())]
+    Refused(PathBuf, #[source] std::io::Error),
+}
+
+/// A place where a file can be written.
+#[derive(Debug)]
+pub struct Output {
+    /// As the user named it.
+    path: PathBuf,
+    /// What is replaced: the target of a symbolic link, not the link.
+    target: PathBuf,
+    special: bool,
+}
+
+impl Output {
+    /// Checks that `path` can be written, by creating (and removing) a file beside it.
+    ///
+    /// # Errors
+    /// When the folder is missing or cannot be written, or when `path` is a folder.
+    pub fn prepare(path: &Path) -> Result<Self, OutputError> {
+        let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        let existing = fs::metadata(&target).ok();
+        if existing.as_ref().is_some_and(fs::Metadata::is_dir) {
+            return Err(OutputError::IsFolder(path.to_path_buf()));
+        }
+        let output = Self {
+            path: path.to_path_buf(),
+            special: existing.is_some_and(|metadata| !metadata.is_file()),
+            target,
+        };
+        if !output.special {
+            output.temporary()?;
+        }
+        Ok(output)
+    }
+
+    /// The path as it was given.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Makes `bytes` the content of the file, at once.
+    ///
+    /// # Errors
+    /// When the system refuses; an older file is then still there, unchanged.
+    pub fn write(&self, bytes: &[u8]) -> Result<(), OutputError> {
+        let refused = |error| OutputError::Refused(self.path.clone(), error);
+        if self.special {
+            return fs::OpenOptions::new()
+                .write(true)
+                .open(&self.target)
+                .and_then(|mut file| file.write_all(bytes))
+                .map_err(refused);
+        }
+        let mut temporary = self.temporary()?;
+        temporary.write_all(bytes).map_err(refused)?;
+        temporary
+            .persist(&self.target)
+            .map_err(|error| refused(error.error))?;
+        Ok(())
+    }
+
+    /// A new file in the target's folder, removed again unless it is renamed.
+    fn temporary(&self) -> Result<tempfile::NamedTempFile, OutputError> {
+        let folder = match self.target.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        if !folder.is_dir() {
+            return Err(OutputError::NoFolder {
+                path: self.path.clone(),
+                folder: folder.to_path_buf(),
+            });
+        }
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".luxel-");
+        #[cfg(unix)]
+        {
+            // As any new file: readable by others, less what the user's mask forbids.
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(fs::Permissions::from_mode(0o666));
+        }
+        builder
+            .tempfile_in(folder)
+            .map_err(|error| OutputError::Refused(self.path.clone(), error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_replaced_whole_and_leaves_nothing_beside_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("out.txt");
+        fs::write(&path, "old").expect("a file");
+        let output = Output::prepare(&path).expect("writable");
+        assert_eq!(fs::read_to_string(&path).expect("readable"), "old");
+        output.write(b"new").expect("written");
+        assert_eq!(fs::read_to_string(&path).expect("readable"), "new");
+        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1);
+    }
+
+    #[test]
+    fn a_missing_folder_is_named_before_the_work() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("missing").join("out.exr");
+        let error = Output::prepare(&path).expect_err("no folder").to_string();
+        assert!(error.contains("out.exr") && error.contains("mkdir -p"));
+    }
+
+    #[test]
+    fn a_folder_is_no_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let error = Output::prepare(folder.path()).expect_err("a folder");
+        assert!(matches!(error, OutputError::IsFolder(_)));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link_and_special_files_are_written_in_place() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("file");
+        let link = folder.path().join("link");
+        fs::write(&file, "old").expect("a file");
+        std::os::unix::fs::symlink(&file, &link).expect("a link");
+        Output::prepare(&link)
+            .and_then(|output| output.write(b"new"))
+            .expect("written");
+        assert!(fs::symlink_metadata(&link).expect("a link").is_symlink());
+        assert_eq!(fs::read_to_string(&file).expect("readable"), "new");
+        Output::prepare(Path::new("/dev/null"))
+            .and_then(|output| output.write(b"nothing"))
+            .expect("written");
+        assert!(!fs::metadata("/dev/null").expect("still there").is_file());
+    }
+}
