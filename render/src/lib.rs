@@ -5,6 +5,7 @@
 //! It holds no transport algorithm of its own besides the image integrators.
 
 pub mod camera;
+pub mod cli;
 pub mod diff;
 pub mod files;
 pub mod film;

@@ -1,0 +1,63 @@
+//! How the command ends.
+
+use std::error::Error;
+
+/// The exit codes that scripts rely on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExitCode {
+    /// Done.
+    Ok = 0,
+    /// An internal error, or a file that cannot be read or written.
+    Failure = 1,
+    /// Wrong arguments.
+    Usage = 2,
+    /// The scene or another input is invalid; the message names the place.
+    InvalidInput = 3,
+    /// There is nothing to do: no light, no receiver, no points.
+    NothingToDo = 4,
+    /// A limit that the user set is exceeded: `check --strict`, `diff --max-rel-rmse`.
+    LimitExceeded = 5,
+}
+
+impl From<ExitCode> for std::process::ExitCode {
+    fn from(exit: ExitCode) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// An error with the exit code that it leads to.
+#[derive(Debug)]
+pub(super) struct Failure {
+    /// The exit code.
+    pub(super) exit: ExitCode,
+    /// What went wrong, with its causes.
+    pub(super) error: Box<dyn Error + Send + Sync>,
+}
+
+impl Failure {
+    /// `error`, leading to `exit`. Text is an error, too.
+    pub(super) fn new(exit: ExitCode, error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self {
+            exit,
+            error: error.into(),
+        }
+    }
+}
+
+/// The exit code that an error of the library leads to.
+macro_rules! exits_with {
+    ($($error:ty => $exit:ident),+ $(,)?) => {
+        $(impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::new(ExitCode::$exit, error)
+            }
+        })+
+    };
+}
+
+exits_with! {
+    crate::diff::DiffError => InvalidInput,
+    crate::image::exr::ReadExrError => Failure,
+    serde_json::Error => Failure,
+    rayon::ThreadPoolBuildError => Failure,
+}

@@ -1,0 +1,165 @@
+//! The `luxel` command: one file per verb.
+//!
+//! stdout carries results only; progress, summaries, warnings and errors go to stderr. The verbs
+//! read their arguments, call the library and print; what they compute lives elsewhere.
+
+mod common;
+mod diff;
+mod exit;
+mod reporter;
+
+pub use exit::ExitCode;
+
+use clap::Parser;
+use common::Common;
+use exit::Failure;
+use reporter::Reporter;
+use std::ffi::OsString;
+use std::io::Write;
+use std::time::Instant;
+
+/// Radiosity and global illumination with a stated error.
+#[derive(Parser)]
+#[command(name = "luxel", version, max_term_width = 100)]
+struct Arguments {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(clap::Subcommand)]
+enum Verb {
+    Diff(diff::Diff),
+}
+
+/// What a verb works with besides its own arguments.
+struct Session<'a> {
+    common: Common,
+    stdout: &'a mut dyn Write,
+    reporter: Reporter<'a>,
+}
+
+impl Session<'_> {
+    /// Prints a result. A reader that has gone away (a closed pipe) is no failure: whoever closed
+    /// it has seen enough.
+    fn print(&mut self, result: &str) -> Result<(), Failure> {
+        let written = writeln!(self.stdout, "{result}").and_then(|()| self.stdout.flush());
+        match written {
+            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                Err(Failure::new(ExitCode::Failure, error))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Runs the command with `args` (the program's name first), as if stderr were no terminal.
+pub fn run(
+    args: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    stdout: &mut dyn Write,
+    stderr: &mut (dyn Write + Send),
+) -> ExitCode {
+    run_with(args, stdout, stderr, false)
+}
+
+/// Runs the command with `args` (the program's name first). `terminal` says that stderr is a
+/// terminal, on which bars may be drawn.
+pub fn run_with(
+    args: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    stdout: &mut dyn Write,
+    stderr: &mut (dyn Write + Send),
+    terminal: bool,
+) -> ExitCode {
+    let arguments = match Arguments::try_parse_from(args) {
+        Ok(arguments) => arguments,
+        Err(error) => return usage(&error, stdout, stderr),
+    };
+    let mut session = Session {
+        reporter: Reporter::new(stderr, terminal, &arguments.common),
+        common: arguments.common,
+        stdout,
+    };
+    let started = Instant::now();
+    let outcome = match arguments.verb {
+        Verb::Diff(verb) => verb.run(&mut session),
+    };
+    let seconds = started.elapsed().as_secs_f64();
+    session.reporter.detail(format_args!("{seconds:.3} s"));
+    outcome.unwrap_or_else(|failure| {
+        session.reporter.error(&failure);
+        failure.exit
+    })
+}
+
+/// Prints clap's message: help and version are results, everything else is a usage error.
+fn usage(error: &clap::Error, stdout: &mut dyn Write, stderr: &mut (dyn Write + Send)) -> ExitCode {
+    // There is nobody left to tell when these writes fail.
+    if error.use_stderr() {
+        let _ = write!(stderr, "{}", error.render());
+        ExitCode::Usage
+    } else {
+        let _ = write!(stdout, "{}", error.render());
+        ExitCode::Ok
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Runs the command and returns exit code, stdout and stderr.
+    fn luxel(args: &[&str]) -> (ExitCode, String, String) {
+        let (mut stdout, mut stderr) = (Vec::new(), Vec::new());
+        let args = std::iter::once("luxel").chain(args.iter().copied());
+        let exit = run(args, &mut stdout, &mut stderr);
+        let text = |bytes| String::from_utf8(bytes).expect("text");
+        (exit, text(stdout), text(stderr))
+    }
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        use clap::CommandFactory;
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn help_and_version_are_results() {
+        let (exit, stdout, stderr) = luxel(&["--version"]);
+        assert_eq!((exit, stderr.as_str()), (ExitCode::Ok, ""));
+        assert!(stdout.starts_with("luxel "));
+        let (exit, stdout, _) = luxel(&["diff", "--help"]);
+        assert_eq!(exit, ExitCode::Ok);
+        assert!(stdout.contains("--max-rel-rmse"));
+    }
+
+    #[test]
+    fn usage_errors_exit_with_2_and_leave_stdout_empty() {
+        for args in [
+            &[][..],
+            &["frobnicate"],
+            &["diff"],
+            &["diff", "a", "b", "-j", "0"],
+        ] {
+            let (exit, stdout, stderr) = luxel(args);
+            assert_eq!((exit, stdout.as_str()), (ExitCode::Usage, ""), "{args:?}");
+            assert!(!stderr.is_empty());
+        }
+    }
+
+    #[test]
+    fn a_closed_stdout_is_no_failure() {
+        struct Closed;
+        impl Write for Closed {
+            fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+                Err(std::io::ErrorKind::BrokenPipe.into())
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Ok(())
+            }
+        }
+        let mut stderr = Vec::new();
+        let exit = run(["luxel", "--help"], &mut Closed, &mut stderr);
+        assert_eq!(exit, ExitCode::Ok);
+    }
+}
