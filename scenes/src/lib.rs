@@ -4,16 +4,30 @@
 //! A [`Scene`] is plain data in world space, in metres, right-handed. It knows nothing of rays,
 //! patches or solving.
 
+#![cfg_attr(
+    test,
+    allow(
+        clippy::float_cmp,
+        reason = "tests compare values that pass through unchanged"
+    )
+)]
+
+mod assemble;
 pub mod camera;
 pub mod id;
 pub mod light;
+pub mod load;
 pub mod material;
+pub mod obj;
 pub mod radiometry;
 pub mod scene;
+pub mod scene_file;
+pub mod texture_file;
 
 pub use camera::{Camera, FieldOfView, Projection};
 pub use id::{FaceId, MaterialId, ObjectId, TextureId};
 pub use light::{Light, LightKind, Sky};
+pub use load::{FailureKind, LoadError, Loaded, Warning, load};
 pub use material::{Material, Sidedness, Specular, Texture};
 pub use radiometry::{
     Exitance, Flux, Intensity, Irradiance, Radiance, Radiosity, Reflectance, Rgb,

@@ -89,7 +89,7 @@ impl Material {
 }
 
 /// How a texture continues outside [0, 1]².
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
 pub enum Wrap {
     /// Repeats.
     #[default]
@@ -136,6 +136,10 @@ impl Texture {
 }
 
 /// The texel that coordinate `i` stands for in a row of `size` texels.
+#[expect(
+    clippy::cast_possible_wrap,
+    reason = "an image has fewer than 2^63 texels a side"
+)]
 fn wrap_index(i: i64, size: usize, wrap: Wrap) -> usize {
     let n = size as i64;
     let index = match wrap {
