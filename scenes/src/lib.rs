@@ -14,6 +14,7 @@
 
 mod assemble;
 pub mod camera;
+pub mod generate;
 pub mod id;
 pub mod light;
 pub mod load;
