@@ -1,1 +1,16 @@
-//! Support for the tests of luxel.
+//! Support for the tests of luxel: statistics, exact cases, references, error metrics, golden
+//! images, and scenes made in code.
+//!
+//! Nothing here is needed by the product. What a test asserts stands in the test; what it needs to
+//! say it briefly stands here.
+
+pub mod builder;
+pub mod cases;
+pub mod chi_squared;
+pub mod command;
+pub mod golden;
+pub mod hypothesis;
+pub mod metrics;
+pub mod references;
+pub mod scene_files;
+pub mod special;

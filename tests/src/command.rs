@@ -1,0 +1,62 @@
+//! The `luxel` command without a process.
+
+use luxel::cli::{self, ExitCode};
+use std::path::Path;
+
+/// How a run of the command ended.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Its exit code.
+    pub exit: ExitCode,
+    /// Results.
+    pub stdout: String,
+    /// Summaries, warnings, errors.
+    pub stderr: String,
+}
+
+impl Outcome {
+    /// The outcome itself when the command succeeded.
+    ///
+    /// # Panics
+    /// When it did not; the message is the command's own.
+    #[must_use]
+    #[track_caller]
+    pub fn succeeded(self) -> Self {
+        assert_eq!(self.exit, ExitCode::Ok, "luxel failed: {}", self.stderr);
+        self
+    }
+
+    /// stdout as JSON.
+    ///
+    /// # Panics
+    /// When it is not JSON.
+    #[track_caller]
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::from_str(&self.stdout)
+            .unwrap_or_else(|error| panic!("stdout is not JSON ({error}): {}", self.stdout))
+    }
+}
+
+/// Runs `luxel` with the given arguments.
+///
+/// # Panics
+/// When the command prints what is not UTF-8.
+pub fn luxel(args: &[&str]) -> Outcome {
+    let (mut stdout, mut stderr) = (Vec::new(), Vec::new());
+    let args = std::iter::once("luxel").chain(args.iter().copied());
+    let exit = cli::run(args, &mut stdout, &mut stderr);
+    let text = |bytes| String::from_utf8(bytes).expect("the command prints UTF-8");
+    Outcome {
+        exit,
+        stdout: text(stdout),
+        stderr: text(stderr),
+    }
+}
+
+/// A path as an argument.
+///
+/// # Panics
+/// When it is not UTF-8, which the paths of tests are.
+pub fn arg(path: &Path) -> &str {
+    path.to_str().expect("paths of tests are UTF-8")
+}
