@@ -1,1 +1,3 @@
-//! The integration tests of luxel.
+//! The integration tests of luxel, one module per subject.
+
+mod sampling;
