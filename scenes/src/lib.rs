@@ -15,6 +15,7 @@
 mod assemble;
 pub mod camera;
 pub mod generate;
+pub mod gltf_file;
 pub mod id;
 pub mod light;
 pub mod load;

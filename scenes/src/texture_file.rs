@@ -97,7 +97,7 @@ pub(crate) fn push(scene: &mut Scene, texture: Texture) -> TextureId {
 }
 
 /// Decodes by content, and by extension where the content says nothing (TGA).
-fn decode(bytes: &[u8], file: &Path) -> Result<DynamicImage, image::ImageError> {
+pub(crate) fn decode(bytes: &[u8], file: &Path) -> Result<DynamicImage, image::ImageError> {
     let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes));
     if let Ok(format) = image::ImageFormat::from_path(file) {
         reader.set_format(format);

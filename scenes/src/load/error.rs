@@ -1,6 +1,7 @@
 //! What can be wrong with a scene, said so that it can be put right.
 
 use super::place::{Place, suggestion};
+use crate::gltf_file::GltfError;
 use crate::obj::{MtlError, ObjError};
 use crate::scene_file::SceneFileError;
 use crate::texture_file::TextureError;
@@ -47,6 +48,9 @@ pub enum LoadError {
     /// Something in an MTL file.
     #[error(transparent)]
     Mtl(#[from] MtlError),
+    /// Something in a glTF file.
+    #[error(transparent)]
+    Gltf(#[from] GltfError),
     /// An image.
     #[error(transparent)]
     Texture(#[from] TextureError),

@@ -10,11 +10,14 @@ pub use error::{ExtentError, FailureKind, LoadError, MaterialError, MaterialProb
 pub use place::Place;
 pub use warning::{FacePlace, Warning};
 
+pub(crate) use warning::count_ignored;
+
 pub(crate) use error::read_file;
+pub(crate) use finish::WHITE;
 pub(crate) use part::{MaterialSource, Merged, Part, unique_name};
 
 use crate::scene::Scene;
-use crate::{obj, scene_file};
+use crate::{gltf_file, obj, scene_file};
 use std::ffi::OsStr;
 use std::path::Path;
 
@@ -69,6 +72,7 @@ fn load_scene_file(file: &Path, opened: Option<&Path>, stem: String) -> Result<L
 pub(crate) fn read_geometry(file: &Path, named_at: Option<&Place>) -> Result<Part, LoadError> {
     match extension(file).as_str() {
         "obj" => obj::read(file, named_at),
+        "gltf" | "glb" => gltf_file::read(file, named_at),
         _ => Err(LoadError::UnknownFormat {
             file: file.to_owned(),
         }),

@@ -188,3 +188,28 @@ impl fmt::Display for Warning {
         }
     }
 }
+
+/// Adds one to the warning about `what`, or makes it.
+pub(crate) fn count_ignored(
+    warnings: &mut Vec<Warning>,
+    what: &str,
+    place: &Place,
+    why: &'static str,
+) {
+    for warning in warnings.iter_mut() {
+        if let Warning::Ignored {
+            count, what: known, ..
+        } = warning
+            && known == what
+        {
+            *count += 1;
+            return;
+        }
+    }
+    warnings.push(Warning::Ignored {
+        count: 1,
+        place: place.clone(),
+        what: what.to_owned(),
+        why,
+    });
+}

@@ -13,7 +13,7 @@
 
 use super::error::MtlError;
 use super::survey::split_keyword;
-use crate::load::{LoadError, MaterialSource, Place, Warning, read_file};
+use crate::load::{LoadError, MaterialSource, Place, Warning, count_ignored, read_file};
 use crate::material::{Material, Specular, Wrap};
 use crate::radiometry::{Radiance, Reflectance, Rgb};
 use crate::scene::{Scene, UnitSystem};
@@ -118,26 +118,6 @@ impl Libraries {
         };
         count_ignored(&mut self.warnings, keyword, place, why);
     }
-}
-
-/// Adds one to the warning about `what`, or makes it.
-fn count_ignored(warnings: &mut Vec<Warning>, what: &str, place: &Place, why: &'static str) {
-    for warning in warnings.iter_mut() {
-        if let Warning::Ignored {
-            count, what: known, ..
-        } = warning
-            && known == what
-        {
-            *count += 1;
-            return;
-        }
-    }
-    warnings.push(Warning::Ignored {
-        count: 1,
-        place: place.clone(),
-        what: what.to_owned(),
-        why,
-    });
 }
 
 /// A line as the parser wants it: colours need three numbers (it panics otherwise), where the format
