@@ -1,1 +1,70 @@
-//! Ray casting, in batches.
+//! Ray casting in batches over the scene's own faces.
+//!
+//! [`Bvh`] is the only place that knows obvhs. Callers hand over batches of rays (64 or more; a
+//! whole patch, a tile of pixels), because what bounds incoherent rays is latency, which a kernel
+//! can hide only across rays.
+
+mod build;
+mod collapse;
+mod node;
+mod ray;
+mod traverse;
+mod triangle;
+
+pub use ray::{Hit, Ray};
+
+use crate::geometry::{Geometry, TriangleId};
+use collapse::Wide;
+
+/// A bounding volume hierarchy over the triangles of a [`Geometry`].
+pub struct Bvh {
+    /// `None` without triangles: every ray misses.
+    wide: Option<Wide>,
+}
+
+impl Bvh {
+    /// Builds the hierarchy on one thread: the same bytes at any thread count.
+    pub fn build(geometry: &Geometry) -> Self {
+        let wide = build::Binary::build(geometry).map(|tree| collapse::collapse(&tree, geometry));
+        Self { wide }
+    }
+
+    /// The first hit of each ray, or [`Hit::MISS`]. Both sides of faces are hit; of faces at the
+    /// same distance the triangle of lowest id counts.
+    ///
+    /// # Panics
+    /// When `hits` is not as long as `rays`.
+    pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Hit]) {
+        assert_eq!(rays.len(), hits.len(), "one hit for each ray");
+        let Some(wide) = &self.wide else {
+            return hits.fill(Hit::MISS);
+        };
+        let mut stack = traverse::stack_for(wide);
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = traverse::closest(wide, ray, &mut stack);
+        }
+    }
+
+    /// Whether anything lies on each ray between its `tmin` and `tmax`; stops at the first hit.
+    ///
+    /// # Panics
+    /// When `blocked` is not as long as `rays`.
+    pub fn occluded(&self, rays: &[Ray], blocked: &mut [bool]) {
+        assert_eq!(rays.len(), blocked.len(), "one answer for each ray");
+        let Some(wide) = &self.wide else {
+            return blocked.fill(false);
+        };
+        let mut stack = traverse::stack_for(wide);
+        for (ray, answer) in rays.iter().zip(blocked) {
+            *answer = traverse::any(wide, ray, &mut stack);
+        }
+    }
+
+    /// The triangles in the order of the leaves: neighbours in this order are neighbours in space.
+    pub fn leaf_order(&self) -> &[TriangleId] {
+        self.wide.as_ref().map_or(&[], |wide| &wide.leaf_order)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,72 @@
+//! Nodes of eight children and leaf blocks of four triangles, as structures of arrays.
+
+/// Children of a node and triangles of a block.
+pub(super) const WIDTH: usize = 8;
+/// Triangles of one leaf block.
+pub(super) const BLOCK: usize = 4;
+
+/// Bit of a child reference that says it names a block.
+const LEAF: u32 = 1 << 31;
+
+/// A reference to a child: a node or a leaf block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Child(u32);
+
+impl Child {
+    pub(super) fn node(index: usize) -> Self {
+        debug_assert!((index as u32) < LEAF, "a tree holds fewer than 2^31 nodes");
+        Self(index as u32)
+    }
+
+    pub(super) fn block(index: usize) -> Self {
+        debug_assert!((index as u32) < LEAF, "a tree holds fewer than 2^31 blocks");
+        Self(index as u32 | LEAF)
+    }
+
+    pub(super) fn is_block(self) -> bool {
+        self.0 & LEAF != 0
+    }
+
+    pub(super) fn index(self) -> usize {
+        (self.0 & !LEAF) as usize
+    }
+}
+
+/// Eight boxes. `planes[2 * axis]` holds the lower, `planes[2 * axis + 1]` the upper planes; lanes
+/// without a child hold an empty box (lower +∞, upper −∞), which no ray meets.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    pub(super) planes: [[f32; WIDTH]; 6],
+    pub(super) children: [Child; WIDTH],
+}
+
+impl Node {
+    pub(super) const EMPTY: Self = Self {
+        planes: [
+            [f32::INFINITY; WIDTH],
+            [f32::NEG_INFINITY; WIDTH],
+            [f32::INFINITY; WIDTH],
+            [f32::NEG_INFINITY; WIDTH],
+            [f32::INFINITY; WIDTH],
+            [f32::NEG_INFINITY; WIDTH],
+        ],
+        children: [Child(0); WIDTH],
+    };
+}
+
+/// Four triangles: `corners[corner][axis][lane]`. Lanes without a triangle hold NaN, which no test
+/// accepts.
+#[derive(Clone, Debug)]
+#[repr(C, align(32))]
+pub(super) struct Block {
+    pub(super) corners: [[[f32; BLOCK]; 3]; 3],
+    pub(super) triangles: [u32; BLOCK],
+}
+
+impl Block {
+    pub(super) const EMPTY: Self = Self {
+        corners: [[[f32::NAN; BLOCK]; 3]; 3],
+        triangles: [u32::MAX; BLOCK],
+    };
+}
