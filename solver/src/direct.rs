@@ -1,1 +1,0 @@
-//! Direct light at a point.

@@ -1,0 +1,247 @@
+//! The sources of direct light, in the unit frame.
+
+use crate::form_factors::point_to_polygon;
+use crate::geometry::Geometry;
+use crate::patches::join_triangles;
+use crate::surface::Surfaces;
+use glam::DVec3;
+use luxel_scenes::{FaceId, LightKind, Radiance, Rgb, Sidedness};
+
+use super::sky::SkyDome;
+
+/// Most polygons that are integrated exactly at every point; the brightest by flux are chosen, the
+/// light of the others is found by the rays that meet them. Exact integration costs about 50 ns a
+/// polygon and point.
+const MAX_POLYGONS: usize = 512;
+
+/// A source of direct light.
+#[derive(Clone, Debug)]
+pub enum Source {
+    /// An emissive planar convex polygon, counter-clockwise seen from where it shines.
+    Polygon {
+        /// Corners in the unit frame.
+        corners: Vec<DVec3>,
+        /// Unit normal of the side that shines.
+        normal: DVec3,
+        /// Longest side of the box around it, in units.
+        extent: f64,
+        /// Radiance L in W/(m² sr).
+        radiance: Radiance,
+    },
+    /// A point source; a spot when `cone` is given.
+    Point {
+        /// Position in the unit frame.
+        position: DVec3,
+        /// Intensity in W/sr, divided by the square of the metres in a unit: the irradiance in
+        /// W/m² at a distance of one unit.
+        intensity: Rgb,
+        /// Direction of a spot, and the scale and offset that map the cosine from its axis to the
+        /// square root of its falloff (`KHR_lights_punctual`).
+        cone: Option<(DVec3, f64, f64)>,
+    },
+    /// Parallel light.
+    Directional {
+        /// Unit vector towards the light.
+        towards: DVec3,
+        /// Irradiance in W/m² on a surface facing the light.
+        irradiance: Rgb,
+    },
+}
+
+impl Source {
+    /// Irradiance in W/m² at a point of the unit frame with the given unit normal, as if nothing
+    /// were in between. Exact.
+    pub fn irradiance(&self, position: DVec3, normal: DVec3) -> Rgb {
+        match self {
+            Self::Polygon {
+                corners, radiance, ..
+            } => radiance.to_irradiance().0 * point_to_polygon(position, normal, corners),
+            Self::Point {
+                position: source,
+                intensity,
+                cone,
+            } => {
+                let to = *source - position;
+                let distance_squared = to.length_squared();
+                let cosine = to.dot(normal) / distance_squared.sqrt();
+                if cosine.is_nan() || cosine <= 0.0 {
+                    return Rgb::ZERO;
+                }
+                let falloff = cone.map_or(1.0, |(axis, scale, offset)| {
+                    let cosine = -to.dot(axis) / distance_squared.sqrt();
+                    (cosine * scale + offset).clamp(0.0, 1.0).powi(2)
+                });
+                *intensity * (falloff * cosine / distance_squared)
+            }
+            Self::Directional {
+                towards,
+                irradiance,
+            } => *irradiance * towards.dot(normal).max(0.0),
+        }
+    }
+}
+
+/// Every source of a scene.
+pub struct Lights {
+    sources: Vec<Source>,
+    /// True for faces whose emission is a source here: rays that meet them must not count it again.
+    is_source: Vec<bool>,
+    sky: Option<SkyDome>,
+}
+
+impl Lights {
+    /// Collects the lights of a scene.
+    pub fn new(surfaces: &Surfaces) -> Self {
+        let scene = surfaces.scene();
+        let geometry = surfaces.geometry();
+        let emissive: Vec<FaceId> = scene
+            .face_ids()
+            .filter(|&face| {
+                let material = surfaces.material(face);
+                material.is_emissive() && material.emission_texture.is_none()
+            })
+            .collect();
+        let mut polygons = polygons(surfaces, geometry, &emissive);
+        if polygons.len() > MAX_POLYGONS {
+            // Stable: equal fluxes keep the order of the file.
+            polygons.sort_by(|a, b| b.flux.total_cmp(&a.flux));
+            polygons.truncate(MAX_POLYGONS);
+        }
+        let mut is_source = vec![false; scene.faces.len()];
+        let mut sources = Vec::new();
+        for polygon in polygons {
+            for face in polygon.faces {
+                is_source[face.index()] = true;
+            }
+            let EmissivePolygon {
+                corners,
+                radiance,
+                normal,
+                extent,
+                ..
+            } = polygon;
+            if polygon.two_sided {
+                let corners = corners.iter().rev().copied().collect();
+                sources.push(Source::Polygon {
+                    corners,
+                    normal: -normal,
+                    extent,
+                    radiance,
+                });
+            }
+            sources.push(Source::Polygon {
+                corners,
+                normal,
+                extent,
+                radiance,
+            });
+        }
+        let frame = geometry.frame();
+        let per_square_unit = 1.0 / (frame.metres_per_unit * frame.metres_per_unit);
+        for light in &scene.lights {
+            match &light.kind {
+                LightKind::Point {
+                    position,
+                    intensity,
+                } => sources.push(Source::Point {
+                    position: frame.to_unit(*position),
+                    intensity: intensity.0 * per_square_unit,
+                    cone: None,
+                }),
+                LightKind::Spot {
+                    position,
+                    direction,
+                    intensity,
+                    inner_angle,
+                    outer_angle,
+                } => {
+                    let scale = 1.0 / (inner_angle.cos() - outer_angle.cos()).max(1e-3);
+                    sources.push(Source::Point {
+                        position: frame.to_unit(*position),
+                        intensity: intensity.0 * per_square_unit,
+                        cone: Some((*direction, scale, -outer_angle.cos() * scale)),
+                    });
+                }
+                LightKind::Directional {
+                    direction,
+                    irradiance,
+                } => {
+                    sources.push(Source::Directional {
+                        towards: -*direction,
+                        irradiance: irradiance.0,
+                    });
+                }
+                LightKind::Sky { .. } | LightKind::Environment { .. } => {}
+            }
+        }
+        Self {
+            sources,
+            is_source,
+            sky: SkyDome::new(scene),
+        }
+    }
+
+    /// The sources that shadow rays are cast to.
+    pub fn sources(&self) -> &[Source] {
+        &self.sources
+    }
+
+    /// Whether the emission of a face is a source here.
+    pub fn is_source(&self, face: FaceId) -> bool {
+        self.is_source[face.index()]
+    }
+
+    /// Radiance from outside the scene, from the direction that a ray travels to; zero without sky.
+    pub fn sky(&self, surfaces: &Surfaces, direction: DVec3) -> Radiance {
+        self.sky.as_ref().map_or(Radiance::ZERO, |sky| {
+            sky.radiance(surfaces.scene(), direction)
+        })
+    }
+
+    /// True when directions without a face are not black.
+    pub fn has_sky(&self) -> bool {
+        self.sky.is_some()
+    }
+}
+
+struct EmissivePolygon {
+    corners: Vec<DVec3>,
+    normal: DVec3,
+    extent: f64,
+    radiance: Radiance,
+    flux: f64,
+    two_sided: bool,
+    faces: Vec<FaceId>,
+}
+
+/// The emissive faces with coplanar pairs of triangles joined, in the order of the file.
+fn polygons(surfaces: &Surfaces, geometry: &Geometry, emissive: &[FaceId]) -> Vec<EmissivePolygon> {
+    let make = |corners: Vec<DVec3>, faces: Vec<FaceId>| {
+        let material = surfaces.material(faces[0]);
+        let area: f64 = faces.iter().map(|&face| surfaces.area(face)).sum();
+        EmissivePolygon {
+            corners,
+            normal: geometry.normal(faces[0]),
+            extent: faces
+                .iter()
+                .map(|&face| geometry.extent(face))
+                .fold(0.0, f64::max),
+            radiance: material.emission,
+            flux: area * material.emission.0.element_sum(),
+            two_sided: material.sidedness == Sidedness::Both,
+            faces,
+        }
+    };
+    let mut joined = vec![false; geometry.face_count()];
+    let mut polygons = Vec::new();
+    for (faces, corners) in join_triangles(surfaces, emissive) {
+        joined[faces[0].index()] = true;
+        joined[faces[1].index()] = true;
+        polygons.push(make(corners.to_vec(), faces.to_vec()));
+    }
+    for &face in emissive.iter().filter(|face| !joined[face.index()]) {
+        polygons.push(make(geometry.polygon(face), vec![face]));
+    }
+    polygons.sort_by_key(|polygon| polygon.faces[0]);
+    polygons
+}

@@ -1,0 +1,13 @@
+//! Direct light: what arrives at a point from the sources without reflection.
+//!
+//! Emissive polygons are integrated exactly (Lambert's formula) and multiplied by a visibility
+//! that is sampled by the same kernel; point, spot and directional lights cost one shadow ray; the
+//! sky is seen by the rays of rows and gathers that leave the scene.
+
+mod kernel;
+mod lights;
+mod sampler;
+mod sky;
+
+pub use lights::{Lights, Source};
+pub use sampler::{DirectSampler, Sample, ShadowRays};
