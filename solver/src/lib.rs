@@ -6,6 +6,8 @@ pub mod sampling;
 
 pub mod geometry;
 
+pub mod surface;
+
 pub mod bvh;
 
 pub mod patches;
@@ -17,5 +19,9 @@ pub mod transport;
 pub mod solvers;
 
 pub mod direct;
+
+pub mod world;
+
+pub mod radiosity;
 
 pub mod gather;

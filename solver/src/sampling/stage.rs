@@ -26,6 +26,8 @@ impl Stage {
     pub const PATCH_DIRECT: Self = Self(9);
     /// Continuation of gather rays whose hit is too near to be looked up.
     pub const NEAR_CHAIN: Self = Self(10);
+    /// Points on lights, from the links of near chains.
+    pub const NEAR_DIRECT: Self = Self(14);
     /// Choices by chance: Russian roulette, Fresnel.
     pub const CHOICE: Self = Self(11);
     /// Jitter of bounding boxes while a BVH is built.

@@ -4,8 +4,10 @@
 //! so that a row gathers: E_i = Σ_j F_ij B_j. Solvers see an operator through [`Transport`] only.
 
 mod dense;
+mod sparse_rows;
 
 pub use dense::{Dense, DenseError};
+pub use sparse_rows::{Row, SparseRows};
 
 use luxel_scenes::{Irradiance, Radiosity};
 use nalgebra::DMatrix;

@@ -1,0 +1,197 @@
+//! Gather rays whose hits are too near to be looked up go on as paths.
+//!
+//! At a hit y nearer than the size of its patch, B(y) = ρ(y) (E^direct(y) + B(next)): direct light
+//! by one shadow ray to a light chosen by its contribution, and one cosine-distributed ray onwards,
+//! until a hit is far enough to be looked up in its far class. From the second link on the path
+//! survives with probability max ρ (Russian roulette, unbiased); after [`MAX_LINKS`] links the
+//! near class of the patch answers.
+//!
+//! Measured on furnished rooms: the error that finite patches make falls 1.3–3 times, and the
+//! relative error in dark places from 219 % to 4.5 %.
+
+use crate::bvh::{Hit, Ray};
+use crate::direct::{DirectSampler, Sample, ShadowRays};
+use crate::patches::Patches;
+use crate::radiosity::{Class, RadiositySolution};
+use crate::sampling::{self, Sequence, Stage, cosine_hemisphere};
+use crate::world::{Receiver, World};
+use luxel_scenes::{Irradiance, Rgb};
+
+/// Links after which a chain is looked up wherever it is: light in crevices of that depth is
+/// below 1 % of what entered for ρ ≤ 0.75. More measured no different.
+const MAX_LINKS: u32 = 16;
+
+/// A path on its way: what it will add to its receiver is its throughput times B at the next hit.
+#[derive(Clone, Copy)]
+struct Path {
+    receiver: u32,
+    ray: u32,
+    throughput: Rgb,
+}
+
+/// Scratch space for gathering a batch of receivers.
+pub(super) struct Chains<'a> {
+    world: &'a World<'a>,
+    patches: &'a Patches,
+    direct: DirectSampler<'a>,
+    paths: Vec<Path>,
+    rays: Vec<Ray>,
+    hits: Vec<Hit>,
+}
+
+impl<'a> Chains<'a> {
+    pub(super) fn new(world: &'a World<'a>, patches: &'a Patches) -> Self {
+        Self {
+            world,
+            patches,
+            direct: DirectSampler::new(world.lights(), world.bvh()),
+            paths: Vec::new(),
+            rays: Vec::new(),
+            hits: Vec::new(),
+        }
+    }
+
+    /// Casts `rays` rays from each receiver and follows them; `add` is called once a receiver with
+    /// its position in the batch, the sum of B over its rays, and the number of back hits.
+    pub(super) fn gather(
+        &mut self,
+        solution: &RadiositySolution,
+        receivers: &[Receiver],
+        items: &[u64],
+        seed: u64,
+        rays: usize,
+        mut add: impl FnMut(usize, Rgb, usize),
+    ) {
+        let mut sums = vec![Rgb::ZERO; receivers.len()];
+        let mut backs = vec![0; receivers.len()];
+        self.start(receivers, items, seed, rays);
+        for link in 0.. {
+            if self.paths.is_empty() {
+                break;
+            }
+            self.hits.resize(self.rays.len(), Hit::MISS);
+            self.world.bvh().closest_hits(&self.rays, &mut self.hits);
+            let near = self.look_up(solution, link, &mut sums, &mut backs);
+            self.go_on(near, items, seed, link, &mut sums);
+        }
+        for (slot, (sum, backs)) in sums.into_iter().zip(backs).enumerate() {
+            add(slot, sum, backs);
+        }
+    }
+
+    fn start(&mut self, receivers: &[Receiver], items: &[u64], seed: u64, rays: usize) {
+        self.paths.clear();
+        self.rays.clear();
+        for (slot, (receiver, &item)) in receivers.iter().zip(items).enumerate() {
+            let sequence = Sequence::new(seed, Stage::GATHER, item);
+            let frame = sampling::Frame::around(receiver.normal.as_vec3());
+            for ray in 0..rays as u32 {
+                let local = cosine_hemisphere::sample(sequence.point2_f32(ray));
+                self.rays
+                    .push(Ray::new(receiver.origin, frame.to_world(local)));
+                self.paths.push(Path {
+                    receiver: slot as u32,
+                    ray,
+                    throughput: Rgb::ONE,
+                });
+            }
+        }
+    }
+
+    /// Adds what can be looked up; returns the paths that must go on, with the place to go on from.
+    fn look_up(
+        &self,
+        solution: &RadiositySolution,
+        link: u32,
+        sums: &mut [Rgb],
+        backs: &mut [usize],
+    ) -> Vec<(Path, Receiver)> {
+        let surfaces = self.world.surfaces();
+        let lights = self.world.lights();
+        let mut near = Vec::new();
+        for ((path, ray), hit) in self.paths.iter().zip(&self.rays).zip(&self.hits) {
+            let sum = &mut sums[path.receiver as usize];
+            let Some(interaction) = self.world.interaction(ray, hit) else {
+                let sky = lights.sky(surfaces, ray.direction.as_dvec3());
+                *sum += path.throughput * sky.to_irradiance().0;
+                continue;
+            };
+            let point = interaction.point;
+            let Some(patch) = self.patches.at(
+                surfaces.geometry(),
+                point.triangle,
+                point.u,
+                point.v,
+                interaction.side,
+            ) else {
+                backs[path.receiver as usize] += usize::from(link == 0);
+                continue;
+            };
+            if !lights.is_source(interaction.face) {
+                *sum += path.throughput * surfaces.emission(point).to_radiosity().0;
+            }
+            let throughput = path.throughput * surfaces.reflectance(point).0;
+            if throughput == Rgb::ZERO {
+                continue;
+            }
+            let class = Class::at(hit.t, self.patches.size(patch));
+            if class == Class::Far || link == MAX_LINKS {
+                *sum += throughput * solution.irradiance(patch, class).0;
+            } else {
+                near.push((
+                    Path {
+                        throughput,
+                        ..*path
+                    },
+                    interaction.receiver,
+                ));
+            }
+        }
+        near
+    }
+
+    /// Direct light at the near hits, and the next ray of those that survive.
+    fn go_on(
+        &mut self,
+        near: Vec<(Path, Receiver)>,
+        items: &[u64],
+        seed: u64,
+        link: u32,
+        sums: &mut [Rgb],
+    ) {
+        let sequence = |path: &Path, stage| {
+            Sequence::new(seed, stage, items[path.receiver as usize]).dimension_set(link)
+        };
+        let samples: Vec<Sample> = near
+            .iter()
+            .map(|(path, receiver)| Sample {
+                position: receiver.position,
+                normal: receiver.normal,
+                origin: receiver.origin,
+                sequence: sequence(path, Stage::NEAR_DIRECT),
+                index: path.ray,
+            })
+            .collect();
+        let mut direct = vec![Irradiance::ZERO; samples.len()];
+        self.direct
+            .irradiance(&samples, ShadowRays::One, &mut direct);
+        self.paths.clear();
+        self.rays.clear();
+        for ((mut path, receiver), direct) in near.into_iter().zip(direct) {
+            sums[path.receiver as usize] += path.throughput * direct.0;
+            let u = sequence(&path, Stage::NEAR_CHAIN).point4_f32(path.ray);
+            if link > 0 {
+                let survival = path.throughput.max_element().min(1.0);
+                if f64::from(u[2]) >= survival {
+                    continue;
+                }
+                path.throughput /= survival;
+            }
+            let frame = sampling::Frame::around(receiver.normal.as_vec3());
+            let local = cosine_hemisphere::sample([u[0], u[1]]);
+            self.rays
+                .push(Ray::new(receiver.origin, frame.to_world(local)));
+            self.paths.push(path);
+        }
+    }
+}

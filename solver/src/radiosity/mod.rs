@@ -1,0 +1,164 @@
+//! Radiosity of a scene from ray-cast rows: the coarse solution that a final gather looks up.
+//!
+//! Each patch carries two unknowns, the *far* and the *near* class (see [`rows`]). Direct light is
+//! computed apart at the sample points of the patches, so that the system carries reflected light
+//! only: B = ρ (E^direct + F B).
+
+mod rows;
+
+use crate::direct::Lights;
+use crate::patches::{PatchId, Patches};
+use crate::solvers::{self, Config, Ledger, Outcome, System, SystemError};
+use crate::world::World;
+use luxel_scenes::{Exitance, Irradiance, Radiosity, Reflectance, Rgb};
+
+/// The two unknowns of a patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// The patch as it is seen by rays longer than its size.
+    Far,
+    /// The patch as it is seen from nearby.
+    Near,
+}
+
+impl Class {
+    /// The class in which a patch of the given size is seen from the given distance.
+    pub fn at(distance: f32, size: f32) -> Self {
+        if distance < size {
+            Self::Near
+        } else {
+            Self::Far
+        }
+    }
+}
+
+/// Index of a patch's class among the unknowns.
+pub(crate) fn unknown(patch: PatchId, class: Class) -> usize {
+    2 * patch.index() + usize::from(class == Class::Near)
+}
+
+/// How rows are cast and the system is solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RadiosityConfig {
+    /// Rays of a patch's row, at least 2; cast in pairs from one point.
+    pub rays: usize,
+    /// Shadow rays of each of the `rays / 2` sample points.
+    pub shadow_rays: usize,
+    /// When the iteration stops.
+    pub solver: Config,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Which of several independent randomisations this is.
+    pub replicate: u64,
+}
+
+/// Light received by the patches of a scene, in two classes.
+pub struct RadiositySolution {
+    irradiance: Vec<Irradiance>,
+    rays: Vec<u32>,
+    /// How the iteration ended.
+    pub outcome: Outcome,
+    /// Sweeps of the solver.
+    pub iterations: usize,
+    /// Largest residual in W/m² per channel.
+    pub residual: Rgb,
+    /// Bound on the error that the residual leaves, in W/m² per channel.
+    pub error_bound: Rgb,
+    /// Where the flux goes.
+    pub ledger: Ledger,
+    /// Rays cast for rows.
+    pub row_rays: usize,
+    /// Sample points that were dropped because they lie inside a solid.
+    pub buried_points: usize,
+}
+
+impl RadiositySolution {
+    /// Irradiance (direct and reflected) of a patch as seen in a class, in W/m².
+    pub fn irradiance(&self, patch: PatchId, class: Class) -> Irradiance {
+        self.irradiance[unknown(patch, class)]
+    }
+
+    /// Mean irradiance of a patch over its area in W/m².
+    pub fn mean_irradiance(&self, patch: PatchId) -> Irradiance {
+        let [far, near] = [Class::Far, Class::Near].map(|class| unknown(patch, class));
+        let [far_rays, near_rays] = [far, near].map(|unknown| f64::from(self.rays[unknown]));
+        let total = far_rays + near_rays;
+        if total == 0.0 {
+            return Irradiance::ZERO;
+        }
+        self.irradiance[far] * (far_rays / total) + self.irradiance[near] * (near_rays / total)
+    }
+}
+
+/// Casts rows from every patch and solves for the light that the patches receive.
+///
+/// The solution of a single replicate is unbiased up to second order in the noise of the rows
+/// (measured below 0.1 % at 16 rays a row and ρ = 0.5).
+///
+/// # Errors
+/// When a reflectance is outside [0, 1), which a scene that was read without errors excludes.
+pub fn solve(
+    world: &World,
+    patches: &Patches,
+    config: &RadiosityConfig,
+) -> Result<RadiositySolution, SystemError> {
+    let cast = rows::cast(world, patches, config);
+    let per_class = |values: &[Reflectance]| -> Vec<Reflectance> {
+        values.iter().flat_map(|&value| [value, value]).collect()
+    };
+    let reflectance = per_class(patches.reflectances());
+    let gathered = gathered_emission(world.lights(), patches);
+    let source: Vec<Radiosity> = reflectance
+        .iter()
+        .zip(&cast.direct)
+        .zip(&gathered)
+        .map(|((&rho, &direct), &emission)| emission + rho * direct)
+        .collect();
+    let system = System::new(&cast.rows, &reflectance, &source)?;
+    let solution = solvers::jacobi(&system, &config.solver, solvers::no_progress);
+    let frame = world.surfaces().geometry().frame();
+    let areas: Vec<f64> = (0..patches.len())
+        .flat_map(|index| {
+            let patch = PatchId::new(index);
+            let area = frame.area_to_world(patches.areas()[index]);
+            let [far, near] =
+                [Class::Far, Class::Near].map(|c| f64::from(cast.weights[unknown(patch, c)]));
+            let total = (far + near).max(1.0);
+            [area * far / total, area * near / total]
+        })
+        .collect();
+    let ledger = Ledger::new(&system, &solution, &areas, &gathered, &cast.direct);
+    let irradiance = solution
+        .irradiance
+        .iter()
+        .zip(&cast.direct)
+        .map(|(&e, &direct)| e + direct)
+        .collect();
+    Ok(RadiositySolution {
+        irradiance,
+        rays: cast.weights,
+        outcome: solution.outcome,
+        iterations: solution.iterations,
+        residual: solution.residual,
+        error_bound: solution.error_bound,
+        ledger,
+        row_rays: cast.cast_rays,
+        buried_points: cast.buried_points,
+    })
+}
+
+/// Emission that rays find (rather than shadow rays), per unknown.
+fn gathered_emission(lights: &Lights, patches: &Patches) -> Vec<Exitance> {
+    patches
+        .ids()
+        .flat_map(|patch| {
+            let (faces, _) = patches.faces(patch);
+            let emission = if lights.is_source(faces[0]) {
+                Exitance::ZERO
+            } else {
+                patches.emissions()[patch.index()]
+            };
+            [emission, emission]
+        })
+        .collect()
+}
