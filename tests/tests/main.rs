@@ -1,3 +1,4 @@
 //! The integration tests of luxel, one module per subject.
 
+mod form_factors;
 mod sampling;

@@ -3,8 +3,16 @@
 //! F_ij is the fraction of the flux leaving the front of i that arrives at the front of j, and
 //! A_i F_ij = A_j F_ji.
 
+mod area;
 mod clip;
+mod contour;
+mod edges;
+mod gauss;
 mod point_to_polygon;
+mod polygon;
+mod polygon_to_polygon;
 
 pub use clip::{Plane, clip};
 pub use point_to_polygon::point_to_polygon;
+pub use polygon::{Polygon, PolygonError};
+pub use polygon_to_polygon::{exchange_area, polygon_to_polygon};
