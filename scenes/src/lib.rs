@@ -14,6 +14,7 @@
 
 mod assemble;
 pub mod camera;
+pub mod check;
 pub mod generate;
 pub mod gltf_file;
 pub mod id;
