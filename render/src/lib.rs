@@ -4,12 +4,21 @@
 //! a [`film`], image files, tables of probes and form factors, and the `luxel` command ([`cli`]).
 //! It holds no transport algorithm of its own besides the image integrators.
 
+#![cfg_attr(
+    test,
+    allow(
+        clippy::float_cmp,
+        reason = "tests compare values that pass through unchanged"
+    )
+)]
+
 pub mod camera;
 pub mod cli;
 pub mod diff;
 pub mod files;
 pub mod film;
 pub mod image;
+pub mod integrators;
 pub mod matrix;
 pub mod ply;
 pub mod points;

@@ -30,8 +30,8 @@ impl Diff {
             let reference = exr::read(&self.reference)?.image;
             Ok(difference(&image, &reference)?)
         };
-        let result = session.common.install(compare)??;
-        let text = if session.common.json {
+        let result = session.context.common.install(compare)??;
+        let text = if session.context.common.json {
             serde_json::to_string_pretty(&result)?
         } else {
             table(&result)
@@ -39,7 +39,7 @@ impl Diff {
         session.print(&text)?;
         match self.max_rel_rmse {
             Some(limit) if result.rel_rmse > limit => {
-                session.reporter.warning(format_args!(
+                session.context.reporter.warning(format_args!(
                     "the relative RMSE {} is above the limit {limit}",
                     result.rel_rmse
                 ));

@@ -55,9 +55,25 @@ macro_rules! exits_with {
     };
 }
 
+impl From<luxel_scenes::LoadError> for Failure {
+    fn from(error: luxel_scenes::LoadError) -> Self {
+        let exit = match error.kind() {
+            luxel_scenes::FailureKind::Io => ExitCode::Failure,
+            luxel_scenes::FailureKind::InvalidScene => ExitCode::InvalidInput,
+        };
+        Self::new(exit, error)
+    }
+}
+
 exits_with! {
+    crate::camera::CameraError => InvalidInput,
     crate::diff::DiffError => InvalidInput,
+    crate::files::OutputError => Failure,
     crate::image::exr::ReadExrError => Failure,
+    crate::image::exr::EncodeExrError => Failure,
+    crate::image::png::EncodePngError => Failure,
+    luxel_solver::patches::MeshError => InvalidInput,
+    luxel_solver::solvers::SystemError => InvalidInput,
     serde_json::Error => Failure,
     rayon::ThreadPoolBuildError => Failure,
 }

@@ -6,7 +6,10 @@
 mod common;
 mod diff;
 mod exit;
+mod render;
 mod reporter;
+mod scene;
+mod transport;
 
 pub use exit::ExitCode;
 
@@ -30,13 +33,19 @@ struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum Verb {
+    Render(render::Render),
     Diff(diff::Diff),
 }
 
 /// What a verb works with besides its own arguments.
 struct Session<'a> {
-    common: Common,
+    context: Context<'a>,
     stdout: &'a mut dyn Write,
+}
+
+/// What may be used from any thread.
+struct Context<'a> {
+    common: Common,
     reporter: Reporter<'a>,
 }
 
@@ -76,18 +85,24 @@ pub fn run_with(
         Err(error) => return usage(&error, stdout, stderr),
     };
     let mut session = Session {
-        reporter: Reporter::new(stderr, terminal, &arguments.common),
-        common: arguments.common,
+        context: Context {
+            reporter: Reporter::new(stderr, terminal, &arguments.common),
+            common: arguments.common,
+        },
         stdout,
     };
     let started = Instant::now();
     let outcome = match arguments.verb {
+        Verb::Render(verb) => verb.run(&mut session),
         Verb::Diff(verb) => verb.run(&mut session),
     };
     let seconds = started.elapsed().as_secs_f64();
-    session.reporter.detail(format_args!("{seconds:.3} s"));
+    session
+        .context
+        .reporter
+        .detail(format_args!("{seconds:.3} s"));
     outcome.unwrap_or_else(|failure| {
-        session.reporter.error(&failure);
+        session.context.reporter.error(&failure);
         failure.exit
     })
 }
@@ -101,6 +116,14 @@ fn usage(error: &clap::Error, stdout: &mut dyn Write, stderr: &mut (dyn Write + 
     } else {
         let _ = write!(stdout, "{}", error.render());
         ExitCode::Ok
+    }
+}
+
+/// A length in metres: finite and positive.
+fn parse_length(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(length) if length.is_finite() && length > 0.0 => Ok(length),
+        _ => Err("a length in metres above 0 is needed, such as 0.5".into()),
     }
 }
 

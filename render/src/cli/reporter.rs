@@ -76,6 +76,13 @@ impl<'a> Reporter<'a> {
         }
     }
 
+    /// A summary; hidden by `-q`.
+    pub(super) fn note(&self, text: impl Display) {
+        if !self.quiet {
+            self.lock().line(&text.to_string());
+        }
+    }
+
     /// A detail; shown by `-v`.
     pub(super) fn detail(&self, text: impl Display) {
         if self.verbose {
@@ -252,7 +259,7 @@ mod tests {
         assert_eq!(written(&common(ProgressMode::Json, true), stage), "");
         let quiet = written(&common(ProgressMode::Auto, true), |reporter| {
             reporter.warning("odd");
-            reporter.detail("done");
+            reporter.note("done");
         });
         assert_eq!(quiet, "");
     }
