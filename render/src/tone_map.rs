@@ -5,19 +5,17 @@
 //! OETF(c) = 12.92 c for c ≤ 0.0031308, else 1.055 c^(1/2.4) − 0.055
 //!
 //! (IEC 61966-2-1:1999). Channels are treated alike and clipped: highlights and light sources turn
-//! white, hues below the clip are exact. The automatic exposure puts the 95th percentile of the
-//! luminance Y = 0.2126 R + 0.7152 G + 0.0722 B (Rec. 709) over the pixels with Y > 0 at
-//! [`AUTO_LEVEL`]; a percentile ignores how bright the few pixels of a visible lamp are, which a
-//! mean would not. It depends on the values alone, not on their order. Cost: one sort.
+//! white, hues below the clip are exact. The automatic exposure puts the median of the luminance
+//! Y = 0.2126 R + 0.7152 G + 0.0722 B (Rec. 709) over the pixels with Y > 0 at [`AUTO_LEVEL`]; a
+//! median ignores how bright visible lamps and how dark unlit corners are, which means, also of
+//! logarithms, do not. It depends on the values alone, not on their order. Cost: one selection.
 
 use crate::image::Image;
 
-/// Linear level that the automatic exposure gives to the 95th percentile. A tuned value: higher,
-/// and lit walls around a lamp clip; lower, and rooms look dim.
-pub const AUTO_LEVEL: f32 = 0.7;
-
-/// Which quantile of the luminance the automatic exposure fixes.
-const AUTO_QUANTILE: f64 = 0.95;
+/// Linear level that the automatic exposure gives to the median: a middle grey, a little above the
+/// photographic 18 %. A tuned value: higher, and lit walls around a lamp clip; lower, and rooms
+/// look dim.
+pub const AUTO_LEVEL: f32 = 0.22;
 
 /// A tone curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,9 +33,12 @@ impl ToneMap {
             .map(|[r, g, b]| 0.2126 * r + 0.7152 * g + 0.0722 * b)
             .filter(|y| *y > 0.0 && y.is_finite())
             .collect();
-        luminances.sort_unstable_by(f32::total_cmp);
-        let rank = (luminances.len() as f64 * AUTO_QUANTILE) as usize;
-        let exposure = luminances.get(rank).map_or(1.0, |y| AUTO_LEVEL / y);
+        if luminances.is_empty() {
+            return Self { exposure: 1.0 };
+        }
+        let middle = luminances.len() / 2;
+        let (_, median, _) = luminances.select_nth_unstable_by(middle, f32::total_cmp);
+        let exposure = AUTO_LEVEL / *median;
         // A denormal luminance would overflow the quotient.
         Self {
             exposure: if exposure.is_finite() { exposure } else { 1.0 },

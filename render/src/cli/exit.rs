@@ -1,5 +1,6 @@
 //! How the command ends.
 
+use crate::points::PointsError;
 use std::error::Error;
 
 /// The exit codes that scripts rely on.
@@ -55,6 +56,17 @@ macro_rules! exits_with {
     };
 }
 
+impl From<PointsError> for Failure {
+    fn from(error: PointsError) -> Self {
+        let exit = match error {
+            PointsError::Unreadable(..) => ExitCode::Failure,
+            PointsError::Empty(_) => ExitCode::NothingToDo,
+            _ => ExitCode::InvalidInput,
+        };
+        Self::new(exit, error)
+    }
+}
+
 impl From<luxel_scenes::LoadError> for Failure {
     fn from(error: luxel_scenes::LoadError) -> Self {
         let exit = match error.kind() {
@@ -74,6 +86,7 @@ exits_with! {
     crate::image::png::EncodePngError => Failure,
     luxel_solver::patches::MeshError => InvalidInput,
     luxel_solver::solvers::SystemError => InvalidInput,
+    csv::Error => Failure,
     serde_json::Error => Failure,
     rayon::ThreadPoolBuildError => Failure,
 }

@@ -6,6 +6,7 @@
 mod common;
 mod diff;
 mod exit;
+mod probe;
 mod render;
 mod reporter;
 mod scene;
@@ -34,6 +35,7 @@ struct Arguments {
 #[derive(clap::Subcommand)]
 enum Verb {
     Render(render::Render),
+    Probe(probe::Probe),
     Diff(diff::Diff),
 }
 
@@ -94,6 +96,7 @@ pub fn run_with(
     let started = Instant::now();
     let outcome = match arguments.verb {
         Verb::Render(verb) => verb.run(&mut session),
+        Verb::Probe(verb) => verb.run(&mut session),
         Verb::Diff(verb) => verb.run(&mut session),
     };
     let seconds = started.elapsed().as_secs_f64();
@@ -117,6 +120,14 @@ fn usage(error: &clap::Error, stdout: &mut dyn Write, stderr: &mut (dyn Write + 
         let _ = write!(stdout, "{}", error.render());
         ExitCode::Ok
     }
+}
+
+/// The name of an option's value on the command line.
+fn name(value: &impl clap::ValueEnum) -> String {
+    value
+        .to_possible_value()
+        .map(|value| value.get_name().to_owned())
+        .unwrap_or_default()
 }
 
 /// A length in metres: finite and positive.

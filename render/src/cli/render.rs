@@ -136,7 +136,7 @@ impl Render {
                 software: concat!("luxel ", env!("CARGO_PKG_VERSION")).into(),
                 scene: scene.name.clone(),
                 camera: camera.name.clone(),
-                integrator: self.integrator.name(),
+                integrator: super::name(&self.integrator),
                 unit: match self.integrator {
                     Method::Ao => "1".into(),
                     _ => scene::radiance_unit(scene.units).into(),
@@ -235,7 +235,7 @@ impl Render {
             serde_json::to_string_pretty(&serde_json::json!({
                 "output": path(&self.output),
                 "png": self.png.as_deref().map(path),
-                "integrator": self.integrator.name(),
+                "integrator": super::name(&self.integrator),
                 "size": [width, height],
                 "samples": spp,
                 "error": { "noise": noise },
@@ -247,15 +247,6 @@ impl Render {
             lines.join("\n")
         };
         session.print(&text)
-    }
-}
-
-impl Method {
-    /// The name on the command line.
-    fn name(self) -> String {
-        self.to_possible_value()
-            .map(|value| value.get_name().to_owned())
-            .unwrap_or_default()
     }
 }
 
