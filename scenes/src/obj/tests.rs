@@ -1,5 +1,8 @@
 use super::*;
 use crate::id::FaceId;
+use crate::load::Warning;
+use crate::radiometry::Reflectance;
+use glam::{DVec3, Vec2};
 use proptest::prelude::*;
 use std::fs;
 use tempfile::TempDir;

@@ -23,7 +23,7 @@ const PARALLEL: f64 = 1e-6;
 
 /// Reads a camera; `taken` are those before it.
 pub(super) fn read(
-    value: &super::document::Value,
+    value: &super::value::Value,
     settings: &Settings,
     taken: &[Camera],
 ) -> Result<Camera, SceneFileError> {

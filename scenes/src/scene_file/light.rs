@@ -11,9 +11,10 @@
 //! `KHR_lights_punctual`, t² with t rising linearly in the cosine from the outer to the inner angle,
 //! so that its flux is 2π (1 − cos inner + (cos inner − cos outer)/3) times its intensity.
 
-use super::document::{Table, Value};
+use super::document::Table;
 use super::error::SceneFileError;
 use super::settings::Settings;
+use super::value::Value;
 use crate::light::{Light, LightKind, Sky};
 use crate::load::{LoadError, unique_name};
 use crate::material::Wrap;

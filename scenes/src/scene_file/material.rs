@@ -1,8 +1,9 @@
 //! `[material.NAME]`: overrides what the geometry files say about a material, or makes a new one.
 
-use super::document::{Table, Value};
+use super::document::Table;
 use super::error::SceneFileError;
 use super::settings::Settings;
+use super::value::Value;
 use crate::load::LoadError;
 use crate::material::{Material, Sidedness, Specular, Wrap};
 use crate::radiometry::{Radiance, Reflectance, Rgb};

@@ -43,6 +43,7 @@ mod light;
 mod material;
 mod polygon;
 mod settings;
+mod value;
 
 pub use error::SceneFileError;
 
@@ -57,12 +58,13 @@ use crate::material::Material;
 use crate::radiometry::Reflectance;
 use crate::scene::UnitSystem;
 use crate::texture_file::TextureFiles;
-use document::{Document, Table, Value};
+use document::{Document, Table};
 use glob::Pattern;
 use material::Override;
 use settings::Settings;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use value::Value;
 
 const KEYS: &[&str] = &[
     "geometry", "scene", "camera", "light", "material", "object", "polygon",

@@ -1,8 +1,8 @@
 //! `[[polygon]]`: a face written in the scene file itself, for exact scenes.
 
-use super::document::Value;
 use super::error::SceneFileError;
 use super::settings::Settings;
+use super::value::Value;
 use crate::assemble::{Assembly, Attributes, Corner, Outcome};
 use crate::id::{MaterialId, ObjectId};
 use crate::load::UnknownName;

@@ -35,7 +35,9 @@ impl Settings {
             settings.name = Some(name.string()?.to_owned());
         }
         if let Some(scale) = table.get("scale") {
-            settings.scale = scale.number_in("metres per unit, above 0", |x| x > 0.0)?;
+            settings.scale = scale.number_in("metres per unit, above 0 and at most 1e30", |x| {
+                x > 0.0 && x <= 1e30
+            })?;
         }
         if let Some(up) = table.get("up")
             && up.choice(&["y", "z"])? == "z"
