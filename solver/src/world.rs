@@ -3,7 +3,7 @@
 use crate::bvh::{Bvh, Hit, Ray};
 use crate::direct::Lights;
 use crate::geometry::ray_origin;
-use crate::patches::{MeshError, PatchSize, Patches, Side};
+use crate::patches::{MeshError, PatchId, PatchSize, Patches, Side};
 use crate::surface::{SurfacePoint, Surfaces};
 use glam::{DVec3, Vec3};
 use luxel_scenes::{FaceId, Scene};
@@ -109,6 +109,15 @@ impl<'s> World<'s> {
                 origin,
             },
         })
+    }
+
+    /// The patch that a ray met; `None` for a miss and on the back of a one-sided face.
+    pub fn patch_hit(&self, patches: &Patches, ray: &Ray, hit: &Hit) -> Option<PatchId> {
+        let triangle = hit.triangle()?;
+        let geometry = self.surfaces.geometry();
+        let normal = geometry.normal(geometry.face(triangle));
+        let side = Side::facing(ray.direction.as_dvec3(), normal);
+        patches.at(geometry, triangle, f64::from(hit.u), f64::from(hit.v), side)
     }
 
     /// Receivers from world positions (metres) and normals. A position within rounding of a face

@@ -2,11 +2,11 @@
 
 use crate::form_factors::point_to_polygon;
 use crate::geometry::Geometry;
-use crate::patches::join_triangles;
 use crate::surface::Surfaces;
 use glam::DVec3;
 use luxel_scenes::{FaceId, LightKind, Radiance, Rgb, Sidedness};
 
+use super::merge::merge;
 use super::sky::SkyDome;
 
 /// Most polygons that are integrated exactly at every point; the brightest by flux are chosen, the
@@ -214,34 +214,35 @@ struct EmissivePolygon {
     faces: Vec<FaceId>,
 }
 
-/// The emissive faces with coplanar pairs of triangles joined, in the order of the file.
+/// The emissive faces, merged to as few convex polygons as possible, in the order of the file.
 fn polygons(surfaces: &Surfaces, geometry: &Geometry, emissive: &[FaceId]) -> Vec<EmissivePolygon> {
-    let make = |corners: Vec<DVec3>, faces: Vec<FaceId>| {
-        let material = surfaces.material(faces[0]);
-        let area: f64 = faces.iter().map(|&face| surfaces.area(face)).sum();
-        EmissivePolygon {
-            corners,
-            normal: geometry.normal(faces[0]),
-            extent: faces
-                .iter()
-                .map(|&face| geometry.extent(face))
-                .fold(0.0, f64::max),
-            radiance: material.emission,
-            flux: area * material.emission.0.element_sum(),
-            two_sided: material.sidedness == Sidedness::Both,
-            faces,
-        }
-    };
-    let mut joined = vec![false; geometry.face_count()];
-    let mut polygons = Vec::new();
-    for (faces, corners) in join_triangles(surfaces, emissive) {
-        joined[faces[0].index()] = true;
-        joined[faces[1].index()] = true;
-        polygons.push(make(corners.to_vec(), faces.to_vec()));
-    }
-    for &face in emissive.iter().filter(|face| !joined[face.index()]) {
-        polygons.push(make(geometry.polygon(face), vec![face]));
-    }
-    polygons.sort_by_key(|polygon| polygon.faces[0]);
-    polygons
+    let single = emissive
+        .iter()
+        .map(|&face| (geometry.polygon(face), vec![face]))
+        .collect::<Vec<_>>();
+    let merged = merge(
+        single,
+        |a, b| surfaces.material_id(a[0]) == surfaces.material_id(b[0]),
+        Extend::extend,
+    );
+    merged
+        .into_iter()
+        .map(|(corners, faces)| {
+            let material = surfaces.material(faces[0]);
+            let area: f64 = faces.iter().map(|&face| surfaces.area(face)).sum();
+            let (lower, upper) = corners.iter().fold(
+                (DVec3::INFINITY, DVec3::NEG_INFINITY),
+                |(lower, upper), corner| (lower.min(*corner), upper.max(*corner)),
+            );
+            EmissivePolygon {
+                normal: geometry.normal(faces[0]),
+                extent: (upper - lower).max_element(),
+                radiance: material.emission,
+                flux: area * material.emission.0.element_sum(),
+                two_sided: material.sidedness == Sidedness::Both,
+                corners,
+                faces,
+            }
+        })
+        .collect()
 }

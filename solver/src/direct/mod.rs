@@ -6,6 +6,7 @@
 
 mod kernel;
 mod lights;
+mod merge;
 mod sampler;
 mod sky;
 

@@ -11,8 +11,10 @@ mod gauss;
 mod point_to_polygon;
 mod polygon;
 mod polygon_to_polygon;
+mod ray_cast;
 
 pub use clip::{Plane, clip};
 pub use point_to_polygon::point_to_polygon;
 pub use polygon::{Polygon, PolygonError};
 pub use polygon_to_polygon::{exchange_area, polygon_to_polygon};
+pub use ray_cast::{REPLICATES, RayCastConfig, RayCastFactors, ray_cast};

@@ -221,3 +221,6 @@ fn add_direct(
         total.direct[replicate] += direct.0;
     }
 }
+
+#[cfg(test)]
+mod tests;

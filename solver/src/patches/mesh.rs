@@ -21,6 +21,9 @@ pub enum PatchSize {
     Count(usize),
     /// One patch for each face of the scene.
     Whole,
+    /// One patch for each object of the scene that has faces, in the order of objects, for its
+    /// front: what form factors between objects are computed from.
+    Objects,
 }
 
 /// Why a mesh cannot be made.
@@ -70,6 +73,7 @@ impl Patches {
             PatchSize::Whole => (0..areas.len())
                 .map(|i| single(vec![FaceId::new(i)], &areas))
                 .collect(),
+            PatchSize::Objects => objects(surfaces, &areas),
             PatchSize::Length(length) => {
                 if !(length > 0.0 && length.is_finite()) {
                     return Err(MeshError::Size(length));
@@ -92,8 +96,22 @@ impl Patches {
                 regions
             }
         };
-        Ok(assemble(surfaces, regions))
+        Ok(assemble(surfaces, regions, size == PatchSize::Objects))
     }
+}
+
+/// One region for each object with faces.
+fn objects(surfaces: &Surfaces, areas: &[f64]) -> Vec<Region> {
+    let scene = surfaces.scene();
+    let mut members = vec![Vec::new(); scene.objects.len()];
+    for (index, face) in scene.faces.iter().enumerate() {
+        members[face.object.index()].push(FaceId::new(index));
+    }
+    members
+        .into_iter()
+        .filter(|faces| !faces.is_empty())
+        .map(|faces| single(faces, areas))
+        .collect()
 }
 
 /// Cuts the scene into regions with elements of side `size` (in units).
@@ -197,7 +215,7 @@ fn polygon_shape(polygon: &[DVec3], size: f64) -> Shape {
 }
 
 /// Numbers the patches and computes what they carry.
-fn assemble(surfaces: &Surfaces, mut regions: Vec<Region>) -> Patches {
+fn assemble(surfaces: &Surfaces, mut regions: Vec<Region>, fronts_only: bool) -> Patches {
     let geometry = surfaces.geometry();
     let mut triangle_region = vec![0; geometry.len()];
     let mut patches = Patches {
@@ -217,7 +235,8 @@ fn assemble(surfaces: &Surfaces, mut regions: Vec<Region>) -> Patches {
         {
             triangle_region[triangle.index()] = index as u32;
         }
-        let two_sided = surfaces.material(region.faces[0]).sidedness == Sidedness::Both;
+        let two_sided =
+            !fronts_only && surfaces.material(region.faces[0]).sidedness == Sidedness::Both;
         region.first = patches.area.len() as u32;
         let count = region.element_count();
         region.first_back = two_sided.then_some(region.first + count);
@@ -261,8 +280,8 @@ fn cluster_extent(geometry: &Geometry, region: &Region) -> f64 {
     (upper - lower).max_element()
 }
 
-/// Mean reflectance and emission of an element; textures are averaged over a regular grid of
-/// points, untextured materials cost nothing.
+/// Mean reflectance and emission of an element. Textures, and the materials of an object of several,
+/// are averaged over a regular grid of points; a single plain material costs nothing.
 fn mean_material(
     surfaces: &Surfaces,
     region: &Region,
@@ -270,8 +289,18 @@ fn mean_material(
     side: Side,
 ) -> (Reflectance, Exitance) {
     const GRID: usize = 4;
-    let material = surfaces.material(region.faces[0]);
-    if material.reflectance_texture.is_none() && material.emission_texture.is_none() {
+    let is_textured = |face: &FaceId| {
+        let material = surfaces.material(*face);
+        material.reflectance_texture.is_some() || material.emission_texture.is_some()
+    };
+    let first = surfaces.material_id(region.faces[0]);
+    if region
+        .faces
+        .iter()
+        .all(|&face| surfaces.material_id(face) == first)
+        && !is_textured(&region.faces[0])
+    {
+        let material = surfaces.material(region.faces[0]);
         return (material.reflectance, material.emission.to_exitance());
     }
     let mut reflectance = DVec3::ZERO;

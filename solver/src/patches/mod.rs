@@ -16,23 +16,9 @@ pub use mesh::{MAX_PATCHES, MeshError, PatchSize};
 pub use region::SurfaceSample;
 
 use crate::geometry::{Geometry, TriangleId};
-use crate::surface::Surfaces;
 use glam::DVec3;
 use luxel_scenes::{Exitance, FaceId, Reflectance};
 use region::Region;
-
-/// Joins the coplanar pairs of triangles among `faces` that share a material into convex quads, as
-/// the mesher does: pairs of faces with the quad's corners.
-pub(crate) fn join_triangles(
-    surfaces: &Surfaces,
-    faces: &[FaceId],
-) -> impl Iterator<Item = ([FaceId; 2], [DVec3; 4])> {
-    quads::join(surfaces.geometry(), faces, |face| {
-        surfaces.material_id(face)
-    })
-    .into_iter()
-    .map(|quad| (quad.faces, quad.corners))
-}
 
 /// Index of a patch in [`Patches`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -162,3 +148,6 @@ impl Patches {
         (&region.faces, region.element_of(patch.0).1)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -199,15 +199,13 @@ fn cast_part(
 
 /// The unknown that a ray met, or the sky's share of E: π L of the direction that it left in.
 fn meet(world: &World, patches: &Patches, ray: &Ray, hit: &Hit) -> Met {
-    let Some(interaction) = world.interaction(ray, hit) else {
+    if hit.triangle().is_none() {
         let sky = world
             .lights()
             .sky(world.surfaces(), ray.direction.as_dvec3());
         return Met::Nothing(sky.to_irradiance().0);
-    };
-    let point = interaction.point;
-    let geometry = world.surfaces().geometry();
-    match patches.at(geometry, point.triangle, point.u, point.v, interaction.side) {
+    }
+    match world.patch_hit(patches, ray, hit) {
         None => Met::Back,
         Some(patch) => {
             let class = Class::at(hit.t, patches.size(patch));

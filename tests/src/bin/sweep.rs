@@ -66,16 +66,16 @@ fn run(name: &str, sweep: &[(usize, usize, usize)]) {
         let start = Instant::now();
         let scene = luxel_scenes::load(&path).expect("scene loads").scene;
         let world = World::new(&scene);
-        let loaded = start.elapsed();
+        let loaded = start.elapsed().as_secs_f64();
         let patches = world.mesh(PatchSize::Count(n)).expect("meshes");
-        let meshed = start.elapsed();
+        let meshed = start.elapsed().as_secs_f64();
         let replicates = 4;
         let shadow = (3 * m / 4).clamp(16, 1024);
         let solutions: Vec<_> = (0..replicates)
             .map(|replicate| {
                 let config = RadiosityConfig {
                     rays: k / replicates,
-                    shadow_rays: std::env::var("KD").map_or(1, |v| v.parse().unwrap()),
+                    shadow_rays: 1,
                     solver: Config {
                         tolerance: Tolerance::Error(1e-5),
                         max_iterations: 1000,
@@ -86,7 +86,7 @@ fn run(name: &str, sweep: &[(usize, usize, usize)]) {
                 solve(&world, &patches, &config).expect("solves")
             })
             .collect();
-        let solved = start.elapsed();
+        let solved = start.elapsed().as_secs_f64();
         let receivers = world.receivers(&positions, &normals);
         let config = GatherConfig {
             rays: m,
@@ -96,8 +96,11 @@ fn run(name: &str, sweep: &[(usize, usize, usize)]) {
             seed: 0,
         };
         let result = gather(&world, &patches, &solutions, &receivers, &items, &config);
-        let total = start.elapsed();
-        let values: Vec<Irradiance> = result.iter().map(|g| g.irradiance()).collect();
+        let total = start.elapsed().as_secs_f64();
+        let values: Vec<Irradiance> = result
+            .iter()
+            .map(luxel_solver::gather::Gathered::irradiance)
+            .collect();
         let direct: Vec<Irradiance> = result.iter().map(|g| g.direct).collect();
         let error = Errors::new(&values, &reference.irradiance, &reference.stderr);
         let direct = Errors::new(&direct, &reference.direct, &vec![[0.0; 3]; direct.len()]);
@@ -111,11 +114,11 @@ fn run(name: &str, sweep: &[(usize, usize, usize)]) {
         println!(
             "{:>14} {k:>5} {m:>5} {shadow:>4} | {:.3} {:.3} {:.3} {:.3} {:.3} | {:.3} {:.2} {:+.3} {:.3} {:+.3} | {:.3} iterations {} {}",
             patches.len(),
-            loaded.as_secs_f64(),
-            (meshed - loaded).as_secs_f64(),
-            (solved - meshed).as_secs_f64(),
-            (total - solved).as_secs_f64(),
-            total.as_secs_f64(),
+            loaded,
+            meshed - loaded,
+            solved - meshed,
+            total - solved,
+            total,
             100.0 * error.nrmse,
             100.0 * error.relative,
             100.0 * error.bias,

@@ -1,0 +1,115 @@
+//! Ray-cast form factors: F_ij is the fraction of the cosine-distributed rays from i that meet j
+//! first.
+//!
+//! F_ij = (1 / (π A_i)) ∫_{A_i} ∫ V cos θ dω dA over the directions in which j is seen, estimated
+//! with points spread evenly over i and directions by cosine, four-dimensional Owen-scrambled
+//! Sobol' points. Unbiased. The rays of a patch are split over independent scrambles, whose scatter
+//! gives the standard error; it falls as N^-0.5 to N^-0.75.
+//!
+//! Source: T. J. V. Malley, "A Shading Method for Computer Generated Images", master's thesis,
+//! University of Utah, 1988. Valid for any geometry, occluded or not. Cost: one ray a sample, n
+//! numbers a row.
+
+use crate::bvh::{Hit, Ray};
+use crate::patches::{PatchId, Patches};
+use crate::sampling::{self, Sequence, Stage, cosine_hemisphere};
+use crate::world::World;
+use rayon::prelude::*;
+
+/// Independent randomisations of a row. The standard error has one degree of freedom fewer; more
+/// randomisations make it surer but leave fewer points for each to spread evenly.
+pub const REPLICATES: u64 = 32;
+
+/// Rays per batch.
+const BATCH: u32 = 1024;
+
+/// How many rays to cast.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RayCastConfig {
+    /// Rays of each row, rounded up to a multiple of [`REPLICATES`].
+    pub rays: usize,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+/// Rows of form factors with their standard errors, row-major n×n.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RayCastFactors {
+    /// Number of patches n.
+    pub len: usize,
+    /// F_ij at `i * len + j`.
+    pub factors: Vec<f64>,
+    /// Standard error of each factor. Zero where no ray, or every ray, met: an upper limit is then
+    /// 3 / N (95 %).
+    pub standard_error: Vec<f64>,
+}
+
+/// The form factors between all patches, front to front (each side of a two-sided face is a patch
+/// of its own).
+pub fn ray_cast(world: &World, patches: &Patches, config: &RayCastConfig) -> RayCastFactors {
+    let len = patches.len();
+    let rows: Vec<(Vec<f64>, Vec<f64>)> = (0..len)
+        .into_par_iter()
+        .map(|i| row(world, patches, PatchId::new(i), config))
+        .collect();
+    let mut factors = Vec::with_capacity(len * len);
+    let mut standard_error = Vec::with_capacity(len * len);
+    for (row, error) in rows {
+        factors.extend(row);
+        standard_error.extend(error);
+    }
+    RayCastFactors {
+        len,
+        factors,
+        standard_error,
+    }
+}
+
+fn row(
+    world: &World,
+    patches: &Patches,
+    patch: PatchId,
+    config: &RayCastConfig,
+) -> (Vec<f64>, Vec<f64>) {
+    let per_replicate = (config.rays as u64).div_ceil(REPLICATES).max(1) as u32;
+    let mut sum = vec![0.0; patches.len()];
+    let mut square = vec![0.0; patches.len()];
+    let mut counts = vec![0u32; patches.len()];
+    let mut rays = Vec::with_capacity(BATCH as usize);
+    let mut hits = Vec::new();
+    for replicate in 0..REPLICATES {
+        let item = (replicate << 32) | u64::from(patch.0);
+        let sequence = Sequence::new(config.seed, Stage::FORM_FACTORS, item);
+        counts.fill(0);
+        for first in (0..per_replicate).step_by(BATCH as usize) {
+            rays.clear();
+            for index in first..per_replicate.min(first + BATCH) {
+                let [x, y, u, v] = sequence.point4(index);
+                let point = patches.sample(world.surfaces().geometry(), patch, [x, y]);
+                let frame = sampling::Frame::around(point.normal.as_vec3());
+                let local = cosine_hemisphere::sample([u as f32, v as f32]);
+                rays.push(Ray::new(point.origin, frame.to_world(local)));
+            }
+            hits.resize(rays.len(), Hit::MISS);
+            world.bvh().closest_hits(&rays, &mut hits);
+            for (ray, hit) in rays.iter().zip(&hits) {
+                if let Some(met) = world.patch_hit(patches, ray, hit) {
+                    counts[met.index()] += 1;
+                }
+            }
+        }
+        for (j, &count) in counts.iter().enumerate() {
+            let fraction = f64::from(count) / f64::from(per_replicate);
+            sum[j] += fraction;
+            square[j] += fraction * fraction;
+        }
+    }
+    let n = REPLICATES as f64;
+    let mean: Vec<f64> = sum.iter().map(|s| s / n).collect();
+    let error = mean
+        .iter()
+        .zip(&square)
+        .map(|(mean, square)| ((square / n - mean * mean).max(0.0) / (n - 1.0)).sqrt())
+        .collect();
+    (mean, error)
+}

@@ -1,0 +1,305 @@
+//! The pipeline from rows to gather on scenes with a known answer.
+
+use super::{Components, GatherConfig, Gathered, gather};
+use crate::patches::PatchSize;
+use crate::radiosity::{RadiosityConfig, RadiositySolution, solve};
+use crate::solvers::{Config, Tolerance};
+use crate::world::World;
+use glam::DVec3;
+use luxel_scenes::{
+    Intensity, Irradiance, Light, LightKind, Material, Radiance, Reflectance, Rgb, Scene, Sky,
+};
+use std::f64::consts::PI;
+
+const CONFIG: GatherConfig = GatherConfig {
+    rays: 256,
+    shadow_rays: 64,
+    replicates: 4,
+    components: Components::All,
+    seed: 3,
+};
+
+fn solutions(
+    world: &World,
+    patches: &crate::patches::Patches,
+    rays: usize,
+) -> Vec<RadiositySolution> {
+    (0..4)
+        .map(|replicate| {
+            let config = RadiosityConfig {
+                rays,
+                shadow_rays: 4,
+                solver: Config {
+                    tolerance: Tolerance::Error(1e-9),
+                    max_iterations: 10_000,
+                },
+                seed: 3,
+                replicate,
+            };
+            solve(world, patches, &config).expect("reflectances are below one")
+        })
+        .collect()
+}
+
+fn push_box(scene: &mut Scene, lower: DVec3, upper: DVec3, inwards: bool, material: Material) {
+    let object = scene.push_object(material.name.clone());
+    let material = scene.push_material(material);
+    for axis in 0..3 {
+        for high in [false, true] {
+            let corner = |u: bool, v: bool| {
+                let mut p = lower;
+                p[axis] = if high { upper[axis] } else { lower[axis] };
+                p[(axis + 1) % 3] = if u { upper } else { lower }[(axis + 1) % 3];
+                p[(axis + 2) % 3] = if v { upper } else { lower }[(axis + 2) % 3];
+                p
+            };
+            let mut face = [
+                corner(false, false),
+                corner(true, false),
+                corner(true, true),
+                corner(false, true),
+            ];
+            if high == inwards {
+                face.reverse();
+            }
+            scene.push_face(&face, object, material);
+        }
+    }
+}
+
+fn grey(name: &str, rho: f64, radiance: f64) -> Material {
+    Material::diffuse(name, Reflectance::splat(rho)).with_emission(Radiance::splat(radiance))
+}
+
+fn gather_at(
+    scene: &Scene,
+    points: &[(DVec3, DVec3)],
+    size: PatchSize,
+    config: &GatherConfig,
+) -> Vec<Gathered> {
+    let world = World::new(scene);
+    let patches = world.mesh(size).expect("meshes");
+    let solutions = solutions(&world, &patches, 32);
+    let (positions, normals): (Vec<_>, Vec<_>) = points.iter().copied().unzip();
+    let receivers = world.receivers(&positions, &normals);
+    let items: Vec<u64> = (0..points.len() as u64).collect();
+    gather(&world, &patches, &solutions, &receivers, &items, config)
+}
+
+/// A closed box of uniform emission L and reflectance ρ: L / (1 − ρ) everywhere, so that every
+/// sample has the same value and only rounding is left.
+#[test]
+fn a_furnace_is_exact_to_rounding() {
+    let mut scene = Scene::default();
+    push_box(
+        &mut scene,
+        DVec3::ZERO,
+        DVec3::new(1.0, 2.0, 3.0),
+        true,
+        grey("glow", 0.5, 1.0),
+    );
+    let points = [
+        (DVec3::new(0.3, 0.0, 1.0), DVec3::Y),
+        (
+            DVec3::new(0.5, 1.0, 1.5),
+            DVec3::new(1.0, 2.0, -0.5).normalize(),
+        ),
+    ];
+    for gathered in gather_at(&scene, &points, PatchSize::Length(0.5), &CONFIG) {
+        let expected = PI / (1.0 - 0.5);
+        let error = (gathered.irradiance().0 - Rgb::splat(expected))
+            .abs()
+            .max_element();
+        // The solver's tolerance of 1e-9 of max B = 2π, and sums of 1e3 terms in f64; the near
+        // chain's Russian roulette is exact in the mean only, within 5 standard errors.
+        let allowed = 1e-8 + 5.0 * gathered.standard_error.0.max_element();
+        assert!(error < allowed, "{error} {allowed}");
+        assert!(gathered.standard_error.0.max_element() < 0.03 * expected);
+    }
+}
+
+/// Under a point light alone the direct part is I cos θ / r², whatever the frame's scale.
+#[test]
+fn a_point_light_falls_with_the_square_of_the_distance() {
+    let mut scene = Scene::default();
+    push_box(
+        &mut scene,
+        DVec3::ZERO,
+        DVec3::splat(40.0),
+        true,
+        grey("black", 0.0, 0.0),
+    );
+    scene.lights.push(Light {
+        name: "lamp".into(),
+        kind: LightKind::Point {
+            position: DVec3::new(20.0, 30.0, 20.0),
+            intensity: Intensity::splat(800.0),
+        },
+    });
+    let points = [
+        (DVec3::new(20.0, 0.0, 20.0), DVec3::Y),
+        (DVec3::new(10.0, 0.0, 20.0), DVec3::Y),
+    ];
+    let gathered = gather_at(&scene, &points, PatchSize::Length(10.0), &CONFIG);
+    let expected = [800.0 / 900.0, 800.0 * 30.0 / 1000f64.powf(1.5)];
+    for (gathered, expected) in gathered.iter().zip(expected) {
+        // Coordinates are exact; five roundings.
+        assert!((gathered.irradiance().0.x / expected - 1.0).abs() < 1e-14);
+        assert_eq!(gathered.standard_error, Irradiance::ZERO);
+    }
+}
+
+/// A uniform sky over a black floor: E = π L at an upward receiver, and half of it seen edge-on.
+#[test]
+fn a_uniform_sky_fills_the_hemisphere() {
+    let mut scene = Scene::default();
+    let object = scene.push_object("floor");
+    let material = scene.push_material(grey("floor", 0.0, 0.0));
+    let v = |x: f64, z: f64| DVec3::new(x, 0.0, z);
+    scene.push_face(
+        &[v(-1.0, -1.0), v(-1.0, 1.0), v(1.0, 1.0), v(1.0, -1.0)],
+        object,
+        material,
+    );
+    scene.lights.push(Light {
+        name: "sky".into(),
+        kind: LightKind::Sky {
+            sky: Sky::Uniform {
+                radiance: Radiance::splat(2.0),
+            },
+            up: DVec3::Y,
+        },
+    });
+    let points = [
+        (DVec3::ZERO, DVec3::Y),
+        (DVec3::new(0.0, 0.5, 0.0), DVec3::X),
+    ];
+    let gathered = gather_at(&scene, &points, PatchSize::Whole, &CONFIG);
+    // No direction upwards is blocked: every ray carries the same value.
+    assert!((gathered[0].irradiance().0.x - 2.0 * PI).abs() < 1e-12);
+    let error = (gathered[1].irradiance().0.x - PI).abs();
+    assert!(
+        error < 5.0 * gathered[1].standard_error.0.x + 1e-12,
+        "{error}"
+    );
+}
+
+/// A sealed dark box beside a lit one, sharing a wall of no thickness, stays black.
+#[test]
+fn no_light_leaks_through_a_wall_of_no_thickness() {
+    let mut scene = Scene::default();
+    push_box(
+        &mut scene,
+        DVec3::ZERO,
+        DVec3::ONE,
+        true,
+        grey("lit", 0.7, 1.0),
+    );
+    push_box(
+        &mut scene,
+        DVec3::X,
+        DVec3::new(2.0, 1.0, 1.0),
+        true,
+        grey("dark", 0.7, 0.0),
+    );
+    let points = [
+        (DVec3::new(1.0, 0.5, 0.5), DVec3::X),
+        (DVec3::new(1.0001, 0.0, 0.3), DVec3::Y),
+        (DVec3::new(1.5, 0.0, 0.5), DVec3::Y),
+    ];
+    for gathered in gather_at(&scene, &points, PatchSize::Length(0.2), &CONFIG) {
+        assert_eq!(gathered.irradiance(), Irradiance::ZERO);
+    }
+}
+
+/// The floor beneath a box is inside a solid: its samples are dropped.
+#[test]
+fn points_inside_a_solid_are_dropped() {
+    let mut scene = Scene::default();
+    push_box(
+        &mut scene,
+        DVec3::ZERO,
+        DVec3::splat(4.0),
+        true,
+        grey("room", 0.5, 1.0),
+    );
+    push_box(
+        &mut scene,
+        DVec3::new(1.0, 0.0, 1.0),
+        DVec3::new(2.0, 1.0, 2.0),
+        false,
+        grey("box", 0.5, 1.0),
+    );
+    let world = World::new(&scene);
+    let patches = world.mesh(PatchSize::Length(0.5)).expect("meshes");
+    let solution = solutions(&world, &patches, 32).remove(0);
+    // The four floor patches under the box, 16 points each; the box's own bottom looks out of the
+    // room and sees nothing.
+    assert_eq!(solution.buried_points, 4 * 16);
+}
+
+/// The same bytes at any thread count, and whichever receivers are gathered together.
+#[test]
+fn the_result_does_not_depend_on_threads_or_company() {
+    let mut scene = Scene::default();
+    push_box(
+        &mut scene,
+        DVec3::ZERO,
+        DVec3::splat(4.0),
+        true,
+        grey("room", 0.6, 0.0),
+    );
+    push_box(
+        &mut scene,
+        DVec3::ONE,
+        DVec3::splat(1.5),
+        false,
+        grey("lamp", 0.2, 5.0),
+    );
+    let points: Vec<(DVec3, DVec3)> = (0..40)
+        .map(|i| (DVec3::new(0.1 * f64::from(i), 0.0, 2.0), DVec3::Y))
+        .collect();
+    let run = |threads: usize, points: &[(DVec3, DVec3)]| {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a pool of threads")
+            .install(|| gather_at(&scene, points, PatchSize::Length(0.4), &CONFIG))
+    };
+    let one = run(1, &points);
+    assert_eq!(one, run(2, &points));
+    assert_eq!(one, run(3, &points));
+    assert_eq!(one[..7], run(2, &points[..7]));
+}
+
+/// Between black faces there is direct light only; its exact value does not depend on the rays.
+#[test]
+fn unoccluded_direct_light_is_exact() {
+    let mut scene = Scene::default();
+    let object = scene.push_object("lamp");
+    let material = scene.push_material(grey("lamp", 0.0, 100.0 / PI));
+    let v = DVec3::new;
+    let lamp = [
+        v(-1.0, 3.0, -0.5),
+        v(1.0, 3.0, -0.5),
+        v(1.0, 3.0, 0.5),
+        v(-1.0, 3.0, 0.5),
+    ];
+    scene.push_face(&lamp, object, material);
+    let points = [(DVec3::ZERO, DVec3::Y), (v(10.0, 0.0, 0.0), DVec3::Y)];
+    let config = GatherConfig {
+        components: Components::Direct,
+        ..CONFIG
+    };
+    let gathered = gather_at(&scene, &points, PatchSize::Whole, &config);
+    // Howell B-3 corner sums (forty digits), rounded.
+    for (gathered, expected) in gathered
+        .iter()
+        .zip([6.481_615_684_133_388, 0.049_496_973_299_182_06])
+    {
+        assert!(
+            (gathered.irradiance().0.x / expected - 1.0).abs() < 1e-12,
+            "{gathered:?}"
+        );
+    }
+}

@@ -1,0 +1,207 @@
+//! Laws of the mesh: areas add up, and a point drawn from a patch is found in that patch.
+
+use super::{MeshError, PatchSize, Patches, Side};
+use crate::sampling::{Stage, hash};
+use crate::world::World;
+use glam::DVec3;
+use luxel_scenes::{Material, Reflectance, Scene, Sidedness};
+
+fn scene_of(polygons: &[Vec<DVec3>], sidedness: Sidedness) -> Scene {
+    let mut scene = Scene::default();
+    let object = scene.push_object("object");
+    let mut material = Material::diffuse("grey", Reflectance::splat(0.5));
+    material.sidedness = sidedness;
+    let material = scene.push_material(material);
+    for polygon in polygons {
+        scene.push_face(polygon, object, material);
+    }
+    scene
+}
+
+fn disk(corners: u32) -> Vec<DVec3> {
+    (0..corners)
+        .map(|k| {
+            let angle = f64::from(k) / f64::from(corners) * std::f64::consts::TAU;
+            DVec3::new(3.0 + angle.cos(), 0.0, angle.sin())
+        })
+        .rev()
+        .collect()
+}
+
+/// A trapezoid, a triangle, a pair of triangles that make a rectangle, a disk, a soup of small
+/// triangles.
+fn mixed() -> Vec<Vec<DVec3>> {
+    let v = DVec3::new;
+    let mut polygons = vec![
+        vec![
+            v(0.0, 0.0, 0.0),
+            v(1.0, 0.0, 0.0),
+            v(0.8, 1.0, 0.0),
+            v(0.1, 0.7, 0.0),
+        ],
+        vec![v(0.0, 0.0, 1.0), v(1.0, 0.2, 1.0), v(0.4, 1.0, 1.5)],
+        vec![v(0.0, 2.0, 0.0), v(1.0, 2.0, 0.0), v(1.0, 2.0, 0.5)],
+        vec![v(0.0, 2.0, 0.0), v(1.0, 2.0, 0.5), v(0.0, 2.0, 0.5)],
+        disk(40),
+    ];
+    let random = |i: u64, d: u64| hash::uniform(2, Stage::PATCHES, i, d);
+    for i in 0..400 {
+        let origin = v(random(i, 0), random(i, 1), 3.0 + random(i, 2));
+        let corner = |d: u64| origin + 0.03 * v(random(i, d), random(i, d + 1), random(i, d + 2));
+        polygons.push(vec![corner(3), corner(6), corner(9)]);
+    }
+    polygons
+}
+
+fn polygon_area(polygon: &[DVec3]) -> f64 {
+    let twice: DVec3 = polygon[1..]
+        .windows(2)
+        .map(|p| (p[0] - polygon[0]).cross(p[1] - polygon[0]))
+        .sum();
+    0.5 * twice.length()
+}
+
+fn check_laws(world: &World, patches: &Patches, sides: f64) {
+    let geometry = world.surfaces().geometry();
+    let total: f64 = world
+        .scene()
+        .face_ids()
+        .map(|face| world.surfaces().area(face))
+        .sum();
+    let sum: f64 = patches.areas().iter().sum();
+    // Cells clipped away at the rim of a disk are below 5 % of a cell each.
+    assert!(
+        (sum - sides * total).abs() < 0.02 * sides * total,
+        "{sum} of {total}"
+    );
+    let mut found = 0;
+    let mut drawn = 0;
+    for patch in patches.ids() {
+        let polygons = patches.polygons(geometry, patch);
+        let area: f64 = polygons.iter().map(|polygon| polygon_area(polygon)).sum();
+        let expected = patches.areas()[patch.index()];
+        assert!(
+            (area - expected).abs() < 1e-12 + 1e-9 * expected,
+            "{area} {expected}"
+        );
+        let (faces, side) = patches.faces(patch);
+        for k in 0..16 {
+            let sample =
+                [0, 1].map(|d| hash::uniform(3, Stage::PATCHES, u64::from(patch.0), 2 * k + d));
+            let point = patches.sample(geometry, patch, sample);
+            let located = world.surfaces().locate(faces, point.position);
+            let back = patches.at(geometry, located.triangle, located.u, located.v, side);
+            drawn += 1;
+            found += usize::from(back == Some(patch));
+        }
+    }
+    // A point within rounding of the border may fall to the neighbour.
+    assert!(
+        drawn - found <= drawn / 1000,
+        "{found} of {drawn} points were found in their patch"
+    );
+}
+
+#[test]
+fn no_faces_no_patches() {
+    let scene = Scene::default();
+    let world = World::new(&scene);
+    for size in [
+        PatchSize::Length(0.1),
+        PatchSize::Count(10),
+        PatchSize::Whole,
+        PatchSize::Objects,
+    ] {
+        assert!(
+            world
+                .mesh(size)
+                .expect("an empty mesh is a mesh")
+                .is_empty()
+        );
+    }
+}
+
+#[test]
+fn points_are_found_in_the_patch_that_they_were_drawn_from() {
+    for (sidedness, sides) in [(Sidedness::Front, 1.0), (Sidedness::Both, 2.0)] {
+        let scene = scene_of(&mixed(), sidedness);
+        let world = World::new(&scene);
+        for size in [
+            PatchSize::Length(0.11),
+            PatchSize::Length(5.0),
+            PatchSize::Whole,
+        ] {
+            check_laws(&world, &world.mesh(size).expect("meshes"), sides);
+        }
+    }
+}
+
+#[test]
+fn the_number_of_patches_is_about_what_was_asked_for() {
+    let scene = scene_of(&mixed(), Sidedness::Front);
+    let world = World::new(&scene);
+    for count in [100, 1000, 10_000] {
+        let made = world.mesh(PatchSize::Count(count)).expect("meshes").len() as f64;
+        let ratio = made / count as f64;
+        // Small faces cannot be divided below their number, nor far above it.
+        assert!((0.6..1.6).contains(&ratio), "{made} patches for {count}");
+    }
+}
+
+#[test]
+fn pairs_of_triangles_become_grids_of_squares() {
+    let v = DVec3::new;
+    let scene = scene_of(
+        &[
+            vec![v(0.0, 0.0, 0.0), v(2.0, 0.0, 0.0), v(2.0, 1.0, 0.0)],
+            vec![v(0.0, 0.0, 0.0), v(2.0, 1.0, 0.0), v(0.0, 1.0, 0.0)],
+        ],
+        Sidedness::Front,
+    );
+    let world = World::new(&scene);
+    let patches = world.mesh(PatchSize::Length(0.25)).expect("meshes");
+    assert_eq!(patches.len(), 8 * 4);
+    let cell = 0.25 * 0.25 / world.surfaces().geometry().frame().area_to_world(1.0);
+    assert!(
+        patches
+            .areas()
+            .iter()
+            .all(|area| (area - cell).abs() < 1e-12)
+    );
+}
+
+#[test]
+fn sides_have_patches_of_their_own() {
+    let scene = scene_of(&mixed()[..1], Sidedness::Both);
+    let world = World::new(&scene);
+    let geometry = world.surfaces().geometry();
+    let patches = world.mesh(PatchSize::Whole).expect("meshes");
+    assert_eq!(patches.len(), 2);
+    let triangle = geometry
+        .triangles_of(luxel_scenes::FaceId(0))
+        .next()
+        .expect("one");
+    let at = |side| patches.at(geometry, triangle, 0.2, 0.2, side);
+    assert_ne!(at(Side::Front), at(Side::Back));
+    let one_sided = scene_of(&mixed()[..1], Sidedness::Front);
+    let world = World::new(&one_sided);
+    let patches = world.mesh(PatchSize::Whole).expect("meshes");
+    assert_eq!(
+        patches.at(world.surfaces().geometry(), triangle, 0.2, 0.2, Side::Back),
+        None
+    );
+}
+
+#[test]
+fn impossible_sizes_are_errors() {
+    let scene = scene_of(&mixed(), Sidedness::Front);
+    let world = World::new(&scene);
+    for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = world.mesh(PatchSize::Length(size)).err();
+        assert!(matches!(error, Some(MeshError::Size(_))), "{size}");
+    }
+    assert!(matches!(
+        world.mesh(PatchSize::Length(1e-7)).err(),
+        Some(MeshError::TooMany { .. })
+    ));
+}
