@@ -11,8 +11,14 @@
 //! n-point rule therefore converges as ρ^(−2n), ρ = x + √(x² − 1), x = d/a: the Bernstein ellipse through
 //! the nearest singularity. The pole is of fourth order in r, which multiplies by at most
 //! C(n) = n (2n + 2)(2n + 3) π/6 (the Gauss remainder with the 2n-th derivative (2n + 3)!/3! d^(−2n) of
-//! r⁻⁴). Where the surfaces see each other at grazing angles the kernel is smaller than r⁻² by
-//! cos θ₁ cos θ₂, and the error relative to it larger. [`order`] solves for n.
+//! r⁻⁴). [`order`] solves for n.
+//!
+//! The cosines make a factor f(x) g(y), the heights of each point above the other's plane over r², linear in
+//! each. Where the height h varies little over a polygon (h > 2R), the product's derivative exceeds that
+//! of r⁻⁴ by at most 1 + d/h, and so much more accuracy is asked for. Where it varies by its own size, two
+//! more degrees are integrated (one more point), which takes in f and the Jacobian exactly; f is then
+//! at most three times its mean, so a quarter of the error is asked for. A Jacobian that is not
+//! constant (a triangle, a trapezium) also costs one more point.
 //!
 //! Sources: P. J. Davis, P. Rabinowitz, "Methods of Numerical Integration", 2nd edition, 1984, section
 //! 4.6; L. N. Trefethen, "Is Gauss quadrature better than Clenshaw–Curtis?", SIAM Review 50(1), 2008,
@@ -72,12 +78,30 @@ pub(super) fn half_extents(q: &Quad) -> [f64; 2] {
     ]
 }
 
+/// How a polygon lies towards another one.
+pub(super) struct View {
+    /// Height of its centre above the plane of the other, in metres.
+    pub(super) height: f64,
+    /// Its radius in metres.
+    pub(super) radius: f64,
+}
+
 /// The points a quadrilateral needs when its centre is `distance` away from the other polygon.
-pub(super) fn orders(quad: &Quad, distance: f64, accuracy: f64) -> Option<Orders> {
+pub(super) fn orders(quad: &Quad, distance: f64, view: &View, accuracy: f64) -> Option<Orders> {
     let [a, b] = half_extents(quad);
+    let is_grazing = view.height <= 2.0 * view.radius;
+    let accuracy = if is_grazing {
+        accuracy / 4.0
+    } else {
+        accuracy / (1.0 + distance / view.height)
+    };
+    // A parallelogram's Jacobian is constant.
+    let twist = (quad[0] - quad[1]) + (quad[2] - quad[3]);
+    let is_twisted = twist.length_squared() > 1e-6 * (a * a).max(b * b);
+    let more = usize::from(is_grazing || is_twisted);
     Some([
-        order(a, distance - b, accuracy)?,
-        order(b, distance - a, accuracy)?,
+        order(a, distance - b, accuracy)? + more,
+        order(b, distance - a, accuracy)? + more,
     ])
 }
 
@@ -176,7 +200,11 @@ mod tests {
                 ceiling.reverse();
                 let other = Polygon::new(&ceiling).expect("a square");
                 let centre = (floor[0] + floor[2]) * 0.5;
-                let Some(orders) = orders(&floor, other.distance(centre), accuracy) else {
+                let view = View {
+                    height: distance,
+                    radius: 0.5_f64.sqrt(),
+                };
+                let Some(orders) = orders(&floor, other.distance(centre), &view, accuracy) else {
                     continue;
                 };
                 let value = by_lambert(&floor, DVec3::Z, orders, &other);

@@ -4,6 +4,7 @@
 //! A_i F_ij = A_j F_ji.
 
 mod area;
+mod assembly;
 mod clip;
 mod contour;
 mod edges;
@@ -12,9 +13,14 @@ mod point_to_polygon;
 mod polygon;
 mod polygon_to_polygon;
 mod ray_cast;
+mod repair;
+mod report;
 
+pub use assembly::unoccluded_matrix;
 pub use clip::{Plane, clip};
 pub use point_to_polygon::point_to_polygon;
 pub use polygon::{Polygon, PolygonError};
 pub use polygon_to_polygon::{exchange_area, polygon_to_polygon};
 pub use ray_cast::{REPLICATES, RayCastConfig, RayCastFactors, ray_cast};
+pub use repair::{Repair, RepairError, Target, repair};
+pub use report::{Closure, closure, reciprocity_defect, reciprocity_defect_of_largest};

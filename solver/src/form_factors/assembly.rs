@@ -1,0 +1,82 @@
+//! The matrix of form factors between polygons that see each other entirely.
+//!
+//! Each exchange area S_ij = A_i F_ij is computed once, so that A_i F_ij = A_j F_ji holds to the rounding
+//! of two divisions. Valid for scenes in which nothing stands between two polygons, such as the inside
+//! of a convex room; else see `visibility`. Cost: n²/2 pairs, in parallel, and 8n² bytes.
+
+use super::polygon::Polygon;
+use super::polygon_to_polygon::exchange_area;
+use crate::transport::Dense;
+use rayon::prelude::*;
+
+/// F between all polygons with nothing between them, to a relative `accuracy` of each entry.
+pub fn unoccluded_matrix(polygons: &[Polygon], accuracy: f64) -> Dense {
+    symmetric_matrix(polygons, |i, j| {
+        exchange_area(&polygons[i], &polygons[j], accuracy)
+    })
+}
+
+/// F from the exchange areas S_ij (m²) of pairs i < j.
+pub(super) fn symmetric_matrix(
+    polygons: &[Polygon],
+    exchange: impl Fn(usize, usize) -> f64 + Sync,
+) -> Dense {
+    let n = polygons.len();
+    let mut entries = vec![0.0; n * n];
+    // Rows get shorter: single ones are handed out, so that no thread is left with the long ones.
+    entries
+        .par_chunks_mut(n.max(1))
+        .enumerate()
+        .with_max_len(1)
+        .for_each(|(i, row)| {
+            for (j, entry) in row.iter_mut().enumerate().skip(i + 1) {
+                *entry = exchange(i, j);
+            }
+        });
+    for i in 0..n {
+        for j in i + 1..n {
+            let s = entries[i * n + j];
+            entries[i * n + j] = s / polygons[i].area();
+            entries[j * n + i] = s / polygons[j].area();
+        }
+    }
+    Dense::new(n, entries).expect("exchange areas are finite and not negative")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::form_factors::report::reciprocity_defect;
+    use crate::transport::Transport;
+    use glam::DVec3;
+
+    #[test]
+    fn a_tetrahedron_is_one_third_everywhere() {
+        let v = [
+            DVec3::new(1.0, 1.0, 1.0),
+            DVec3::new(-1.0, 1.0, -1.0),
+            DVec3::new(1.0, -1.0, -1.0),
+            DVec3::new(-1.0, -1.0, 1.0),
+        ];
+        let polygons: Vec<_> = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]
+            .iter()
+            .map(|f| Polygon::new(&f.map(|k| v[k])).expect("a triangle"))
+            .collect();
+        let matrix = unoccluded_matrix(&polygons, 1e-11);
+        for i in 0..4 {
+            for j in 0..4 {
+                let exact = if i == j { 0.0 } else { 1.0 / 3.0 };
+                // Closed forms only: some tens of roundings.
+                assert!((matrix.get(i, j) - exact).abs() < 1e-14, "F[{i}][{j}]");
+            }
+            assert!((matrix.row_sum(i) - 1.0).abs() < 1e-14, "row {i}");
+        }
+        let areas = [polygons[0].area(); 4];
+        assert!(reciprocity_defect(&matrix, &areas) < 1e-15, "reciprocity");
+    }
+
+    #[test]
+    fn no_polygons_make_an_empty_matrix() {
+        assert!(unoccluded_matrix(&[], 1e-6).is_empty(), "nothing");
+    }
+}
