@@ -1,4 +1,5 @@
 //! The integration tests of luxel, one module per subject.
 
+mod enclosures;
 mod form_factors;
 mod sampling;

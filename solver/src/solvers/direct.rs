@@ -62,7 +62,7 @@ pub fn direct(system: &System) -> Result<Solution, DirectError> {
     }
     let mut irradiance = vec![Irradiance::ZERO; n];
     system.transport().gather(&radiosity, &mut irradiance);
-    let residual = system.residual(&radiosity, &irradiance);
+    let residual = system.residual(&radiosity, &irradiance).largest;
     Ok(Solution {
         radiosity,
         irradiance,

@@ -10,6 +10,7 @@
 //! held exactly when it was visited. So |r_i| ≤ ρ_i Σ_j F_ij max_{j>i} |δ_j| bounds it without a
 //! second gather; the true residual is evaluated when this bound comes near the tolerance.
 
+use super::report::Residual;
 use super::{Config, Outcome, Progress, Solution, System};
 use luxel_scenes::{Irradiance, Radiosity, Rgb};
 use std::ops::ControlFlow;
@@ -35,17 +36,17 @@ pub fn gauss_seidel(
     let first = system.residual(&radiosity, &irradiance);
     let mut residual = first;
     let mut is_exact = true;
-    let mut history = vec![first];
+    let mut history = vec![first.largest];
     let outcome = loop {
-        let limit = config.tolerance.residual_limit(system, first, &radiosity);
-        if !is_exact && residual.cmple(limit * NEAR).all() {
+        let limit = config.tolerance.limit(system, &first, &radiosity);
+        if !is_exact && residual.is_within(&limit, NEAR) {
             transport.gather(&radiosity, &mut irradiance);
             residual = system.residual(&radiosity, &irradiance);
             is_exact = true;
         }
         let iteration = history.len() - 1;
-        history[iteration] = residual;
-        if is_exact && residual.cmple(limit).all() {
+        history[iteration] = residual.largest;
+        if is_exact && residual.is_within(&limit, 1.0) {
             break Outcome::Converged;
         }
         if iteration >= config.max_iterations {
@@ -54,7 +55,7 @@ pub fn gauss_seidel(
         if iteration > 0
             && progress(Progress {
                 iteration,
-                residual,
+                residual: residual.largest,
             })
             .is_break()
         {
@@ -63,21 +64,21 @@ pub fn gauss_seidel(
         sweep(system, &mut radiosity, &mut steps);
         residual = residual_bound(system, &steps);
         is_exact = false;
-        history.push(residual);
+        history.push(residual.largest);
     };
     if !is_exact {
         transport.gather(&radiosity, &mut irradiance);
         residual = system.residual(&radiosity, &irradiance);
         history.pop();
-        history.push(residual);
+        history.push(residual.largest);
     }
     Solution {
         radiosity,
         irradiance,
         outcome,
         iterations: history.len() - 1,
-        residual,
-        error_bound: system.error_bound(residual),
+        residual: residual.largest,
+        error_bound: system.error_bound(residual.largest),
         residual_history: history,
     }
 }
@@ -96,16 +97,14 @@ fn sweep(system: &System, radiosity: &mut [Radiosity], steps: &mut [Rgb]) {
     }
 }
 
-/// max_i ρ_i Σ_j F_ij max_{j>i} |δ_j|, an upper bound on the residual after a sweep with steps δ.
-fn residual_bound(system: &System, steps: &[Rgb]) -> Rgb {
+/// The size of ρ_i Σ_j F_ij max_{j>i} |δ_j|, an upper bound on the residual after a sweep with steps δ.
+fn residual_bound(system: &System, steps: &[Rgb]) -> Residual {
     let mut later = Rgb::ZERO;
-    let mut bound = Rgb::ZERO;
-    for i in (0..steps.len()).rev() {
-        let gain = system.reflectance()[i].0 * system.transport().row_sum(i);
-        bound = bound.max(gain * later);
+    Residual::of((0..steps.len()).rev().map(|i| {
+        let bound = system.reflectance()[i].0 * system.transport().row_sum(i) * later;
         later = later.max(steps[i].abs());
-    }
-    bound
+        bound
+    }))
 }
 
 #[cfg(test)]
@@ -170,7 +169,11 @@ mod tests {
             let residual = system.residual(&radiosity, &irradiance);
             let bound = residual_bound(&system, &steps);
             // The bound is exact arithmetic; the residual rounds by n units of B.
-            assert!(residual.cmple(bound + 1e-13).all(), "{residual} {bound}");
+            assert!(
+                residual.largest.cmple(bound.largest + 1e-13).all()
+                    && residual.rms.cmple(bound.rms + 1e-13).all(),
+                "{residual:?} {bound:?}"
+            );
         }
     }
 }

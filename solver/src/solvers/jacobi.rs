@@ -22,28 +22,28 @@ pub fn jacobi(
     let mut radiosity = system.source().to_vec();
     let mut irradiance = vec![Irradiance::ZERO; system.len()];
     let mut history: Vec<Rgb> = Vec::new();
-    let outcome = loop {
+    let mut first = None;
+    let (outcome, residual) = loop {
         system.transport().gather(&radiosity, &mut irradiance);
         let residual = system.residual(&radiosity, &irradiance);
-        history.push(residual);
+        history.push(residual.largest);
         let iteration = history.len() - 1;
-        let limit = config
-            .tolerance
-            .residual_limit(system, history[0], &radiosity);
-        if residual.cmple(limit).all() {
-            break Outcome::Converged;
+        let first = first.get_or_insert(residual);
+        let limit = config.tolerance.limit(system, first, &radiosity);
+        if residual.is_within(&limit, 1.0) {
+            break (Outcome::Converged, residual.largest);
         }
         if iteration >= config.max_iterations {
-            break Outcome::IterationLimit;
+            break (Outcome::IterationLimit, residual.largest);
         }
         if iteration > 0
             && progress(Progress {
                 iteration,
-                residual,
+                residual: residual.largest,
             })
             .is_break()
         {
-            break Outcome::Interrupted;
+            break (Outcome::Interrupted, residual.largest);
         }
         for (((b, &s), &rho), &e) in radiosity
             .iter_mut()
@@ -54,7 +54,6 @@ pub fn jacobi(
             *b = s + rho * e;
         }
     };
-    let residual = history[history.len() - 1];
     Solution {
         radiosity,
         irradiance,

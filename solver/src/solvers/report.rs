@@ -7,9 +7,9 @@ use std::ops::ControlFlow;
 /// When an iteration may stop. Each of the three channels must satisfy it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
-    /// ‖r‖∞ ≤ t ‖r₀‖∞, relative to the residual r₀ = ρFS of the start B = S: the share of the first
+    /// ‖r‖₂ ≤ t ‖r₀‖₂, relative to the residual r₀ = ρFS of the start B = S: the share of the first
     /// bounce that is not yet accounted for. Says how far the iteration has come, not how large
-    /// the error is.
+    /// the error is. It takes ln t / ln λ sweeps, λ the spectral radius of the iteration.
     Residual(f64),
     /// ‖r‖∞ / (1 − ‖ρF‖∞) ≤ t max|B|: the rigorous bound on the largest error, relative to the
     /// largest radiosity of the channel. What results should be asked for with.
@@ -70,21 +70,59 @@ pub struct Solution {
     pub residual_history: Vec<Rgb>,
 }
 
+/// The size of a residual in W/m² per channel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Residual {
+    /// ‖r‖∞, which the error bound is made of.
+    pub(super) largest: Rgb,
+    /// ‖r‖₂/√n.
+    pub(super) rms: Rgb,
+}
+
+impl Residual {
+    /// The size of a residual from its elements.
+    pub(super) fn of(elements: impl Iterator<Item = Rgb>) -> Self {
+        let (mut largest, mut squares, mut count) = (Rgb::ZERO, Rgb::ZERO, 0_usize);
+        for r in elements {
+            largest = largest.max(r.abs());
+            squares += r * r;
+            count += 1;
+        }
+        let rms = squares / count.max(1) as f64;
+        Self {
+            largest,
+            rms: Rgb::new(rms.x.sqrt(), rms.y.sqrt(), rms.z.sqrt()),
+        }
+    }
+
+    /// True when no channel is above `limit` times `factor`.
+    pub(super) fn is_within(&self, limit: &Self, factor: f64) -> bool {
+        self.largest.cmple(limit.largest * factor).all() && self.rms.cmple(limit.rms * factor).all()
+    }
+}
+
 impl Tolerance {
-    /// The largest ‖r‖∞ in W/m² per channel that satisfies it; `first` is ‖r₀‖∞.
-    pub(super) fn residual_limit(
+    /// The largest residual that satisfies it, given that of the start and the radiosity so far.
+    pub(super) fn limit(
         self,
         system: &System,
-        first: Rgb,
+        first: &Residual,
         radiosity: &[Radiosity],
-    ) -> Rgb {
+    ) -> Residual {
+        let any = Rgb::INFINITY;
         match self {
-            Self::Residual(t) => first * t,
+            Self::Residual(t) => Residual {
+                largest: any,
+                rms: first.rms * t,
+            },
             Self::Error(t) => {
-                let largest = radiosity
+                let brightest = radiosity
                     .iter()
                     .fold(Rgb::ZERO, |largest, b| largest.max(b.0.abs()));
-                largest * (Rgb::ONE - system.gain()) * t
+                Residual {
+                    largest: brightest * (Rgb::ONE - system.gain()) * t,
+                    rms: any,
+                }
             }
         }
     }

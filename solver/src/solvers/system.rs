@@ -6,6 +6,7 @@
 //! the bound is the standard one of a Neumann series. Valid for ‖ρF‖∞ < 1. It does not count the
 //! rounding of r itself, about n ε max|B|.
 
+use super::report::Residual;
 use crate::transport::Transport;
 use luxel_scenes::{Exitance, Irradiance, Radiosity, Reflectance, Rgb};
 use thiserror::Error;
@@ -176,10 +177,9 @@ impl<'a> System<'a> {
         residual / (Rgb::ONE - self.gain)
     }
 
-    /// ‖S + ρE − B‖∞ in W/m² per channel, where E = F B.
-    pub(super) fn residual(&self, radiosity: &[Radiosity], irradiance: &[Irradiance]) -> Rgb {
-        self.residuals(radiosity, irradiance)
-            .fold(Rgb::ZERO, |largest, r| largest.max(r.abs()))
+    /// The size of S + ρE − B, where E = F B.
+    pub(super) fn residual(&self, radiosity: &[Radiosity], irradiance: &[Irradiance]) -> Residual {
+        Residual::of(self.residuals(radiosity, irradiance))
     }
 
     /// r_i = S_i + ρ_i E_i − B_i in W/m² of each unknown, where E = F B.
