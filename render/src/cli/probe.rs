@@ -13,7 +13,7 @@ use crate::progress::Progress;
 use clap::ValueEnum;
 use glam::DVec3;
 use luxel_scenes::{Rgb, UnitSystem};
-use luxel_solver::gather::{Components, GatherConfig, gather};
+use luxel_solver::gather::{Components, GatherConfig, Key, gather};
 use luxel_solver::world::{Receiver, World};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -246,10 +246,9 @@ fn gather_irradiance(
     let mut gathered = Vec::with_capacity(receivers.len());
     for receivers in receivers.chunks(part) {
         let first = gathered.len() as u64;
-        let items: Vec<u64> = (first..first + receivers.len() as u64).collect();
-        gathered.extend(gather(
-            world, patches, solutions, receivers, &items, &config,
-        ));
+        let last = first + receivers.len() as u64;
+        let keys: Vec<Key> = (first..last).map(Key::of).collect();
+        gathered.extend(gather(world, patches, solutions, receivers, &keys, &config));
         context.reporter.advance(receivers.len() as u64);
     }
     context.reporter.finish();

@@ -11,10 +11,9 @@ use super::vertex::Vertex;
 use super::{Integrator, SampleKey, background, cast};
 use crate::camera::CameraRay;
 use luxel_scenes::{Irradiance, Rgb};
-use luxel_solver::gather::{Components, GatherConfig, gather};
+use luxel_solver::gather::{Components, GatherConfig, Key, gather};
 use luxel_solver::patches::Patches;
 use luxel_solver::radiosity::RadiositySolution;
-use luxel_solver::sampling::hash::mix64;
 use luxel_solver::world::{Receiver, World};
 
 /// How much is spent on a camera sample.
@@ -62,9 +61,12 @@ impl<'w> Gatherer<'w> {
         let Some(first) = keys.first() else {
             return Vec::new();
         };
-        let items: Vec<u64> = keys
+        let keys: Vec<Key> = keys
             .iter()
-            .map(|key| mix64(key.item) ^ u64::from(key.index))
+            .map(|key| Key {
+                item: key.item,
+                index: key.index,
+            })
             .collect();
         let config = GatherConfig {
             rays: self.config.rays,
@@ -80,7 +82,7 @@ impl<'w> Gatherer<'w> {
             self.patches,
             solution,
             receivers,
-            &items,
+            &keys,
             &config,
         )
         .into_iter()

@@ -56,6 +56,24 @@ pub struct GatherConfig {
     pub seed: u64,
 }
 
+/// Where a receiver's random numbers come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Key {
+    /// What is gathered for: a point, a pixel. Items are independent of each other.
+    pub item: u64,
+    /// Which gather of the item this is: gathers 0, 1, 2, … of one item (the camera samples of a
+    /// pixel) draw consecutive parts of one sequence, so that together they are spread as evenly
+    /// as one gather of all their rays.
+    pub index: u32,
+}
+
+impl Key {
+    /// The only gather of an item.
+    pub fn of(item: u64) -> Self {
+        Self { item, index: 0 }
+    }
+}
+
 /// Irradiance at a receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Gathered {
@@ -76,24 +94,24 @@ impl Gathered {
     }
 }
 
-/// Gathers at each receiver. `items` keys the random numbers of a receiver (its index, or its
-/// pixel); the result does not depend on which other receivers are gathered along with it.
+/// Gathers at each receiver. `keys` tells the random numbers of receivers apart; the result does not
+/// depend on which other receivers are gathered along with one.
 ///
 /// `solutions` holds one radiosity solution for each replicate, or is empty when only direct light
 /// is wanted.
 ///
 /// # Panics
-/// When `items` is not as long as `receivers`, the number of replicates is out of range, or indirect light is wanted and there is not one
+/// When `keys` is not as long as `receivers`, the number of replicates is out of range, or indirect light is wanted and there is not one
 /// solution for each replicate.
 pub fn gather(
     world: &World,
     patches: &Patches,
     solutions: &[RadiositySolution],
     receivers: &[Receiver],
-    items: &[u64],
+    keys: &[Key],
     config: &GatherConfig,
 ) -> Vec<Gathered> {
-    assert_eq!(receivers.len(), items.len(), "one item for each receiver");
+    assert_eq!(receivers.len(), keys.len(), "one key for each receiver");
     let replicates = config.replicates;
     assert!(
         (1..=MAX_REPLICATES).contains(&replicates),
@@ -107,8 +125,8 @@ pub fn gather(
     let chunk = (RAYS_PER_TASK / config.rays.max(1)).clamp(1, 256);
     receivers
         .par_chunks(chunk)
-        .zip(items.par_chunks(chunk))
-        .flat_map_iter(|(receivers, items)| {
+        .zip(keys.par_chunks(chunk))
+        .flat_map_iter(|(receivers, keys)| {
             let mut totals = vec![Totals::default(); receivers.len()];
             let mut direct = DirectSampler::new(world.lights(), world.bvh());
             let mut chains = Chains::new(world, patches);
@@ -118,7 +136,7 @@ pub fn gather(
                     add_direct(
                         &mut direct,
                         receivers,
-                        items,
+                        keys,
                         config,
                         replicate,
                         rays,
@@ -128,19 +146,12 @@ pub fn gather(
                 if let Some(solution) = solutions.get(replicate).filter(|_| wants_indirect) {
                     let rays = share(config.rays, replicates, replicate);
                     let seed = replicate_seed(config.seed, replicate);
-                    chains.gather(
-                        solution,
-                        receivers,
-                        items,
-                        seed,
-                        rays,
-                        |slot, sum, backs| {
-                            let total = &mut totals[slot];
-                            total.indirect[replicate] += sum / rays as f64;
-                            total.backs += backs;
-                            total.rays += rays;
-                        },
-                    );
+                    chains.gather(solution, receivers, keys, seed, rays, |slot, sum, backs| {
+                        let total = &mut totals[slot];
+                        total.indirect[replicate] += sum / rays as f64;
+                        total.backs += backs;
+                        total.rays += rays;
+                    });
                 }
             }
             totals
@@ -197,7 +208,7 @@ impl Totals {
 fn add_direct(
     sampler: &mut DirectSampler,
     receivers: &[Receiver],
-    items: &[u64],
+    keys: &[Key],
     config: &GatherConfig,
     replicate: usize,
     rays: usize,
@@ -206,13 +217,13 @@ fn add_direct(
     let seed = replicate_seed(config.seed, replicate);
     let samples: Vec<Sample> = receivers
         .iter()
-        .zip(items)
-        .map(|(receiver, &item)| Sample {
+        .zip(keys)
+        .map(|(receiver, key)| Sample {
             position: receiver.position,
             normal: receiver.normal,
             origin: receiver.origin,
-            sequence: Sequence::new(seed, Stage::DIRECT, item),
-            index: 0,
+            sequence: Sequence::new(seed, Stage::DIRECT, key.item),
+            index: key.index,
         })
         .collect();
     let mut irradiance = vec![Irradiance::ZERO; samples.len()];

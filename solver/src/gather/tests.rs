@@ -1,6 +1,6 @@
 //! The pipeline from rows to gather on scenes with a known answer.
 
-use super::{Components, GatherConfig, Gathered, gather};
+use super::{Components, GatherConfig, Gathered, Key, gather};
 use crate::patches::PatchSize;
 use crate::radiosity::{RadiosityConfig, RadiositySolution, solve};
 use crate::solvers::{Config, Tolerance};
@@ -82,8 +82,8 @@ fn gather_at(
     let solutions = solutions(&world, &patches, 32);
     let (positions, normals): (Vec<_>, Vec<_>) = points.iter().copied().unzip();
     let receivers = world.receivers(&positions, &normals);
-    let items: Vec<u64> = (0..points.len() as u64).collect();
-    gather(&world, &patches, &solutions, &receivers, &items, config)
+    let keys: Vec<Key> = (0..points.len() as u64).map(Key::of).collect();
+    gather(&world, &patches, &solutions, &receivers, &keys, config)
 }
 
 /// A closed box of uniform emission L and reflectance ρ: L / (1 − ρ) everywhere, so that every

@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 use luxel_scenes::{Irradiance, Rgb};
-use luxel_solver::gather::{Components, GatherConfig, gather};
+use luxel_solver::gather::{Components, GatherConfig, Key, gather};
 use luxel_solver::patches::PatchSize;
 use luxel_solver::radiosity::{RadiosityConfig, solve};
 use luxel_solver::solvers::{Config, Tolerance};
@@ -58,7 +58,7 @@ fn run(name: &str, sweep: &[(usize, usize, usize)]) {
     let path = root.join(format!("../scenes/data/{name}/{name}.toml"));
     let positions: Vec<DVec3> = reference.position.iter().map(|&p| p.into()).collect();
     let normals: Vec<DVec3> = reference.normal.iter().map(|&p| p.into()).collect();
-    let items: Vec<u64> = (0..positions.len() as u64).collect();
+    let keys: Vec<Key> = (0..positions.len() as u64).map(Key::of).collect();
     println!(
         "{name}:     n     K     M    S | load   mesh  solve gather  total s | nRMSE %  relRMSE %  bias %  direct nRMSE %, bias % | stated SE %"
     );
@@ -95,7 +95,7 @@ fn run(name: &str, sweep: &[(usize, usize, usize)]) {
             components: Components::All,
             seed: 0,
         };
-        let result = gather(&world, &patches, &solutions, &receivers, &items, &config);
+        let result = gather(&world, &patches, &solutions, &receivers, &keys, &config);
         let total = start.elapsed().as_secs_f64();
         let values: Vec<Irradiance> = result
             .iter()
