@@ -23,4 +23,5 @@ pub mod matrix;
 pub mod ply;
 pub mod points;
 pub mod progress;
+pub mod solution;
 pub mod tone_map;

@@ -3,6 +3,7 @@
 //! stdout carries results only; progress, summaries, warnings and errors go to stderr. The verbs
 //! read their arguments, call the library and print; what they compute lives elsewhere.
 
+mod check;
 mod common;
 mod diff;
 mod exit;
@@ -10,6 +11,7 @@ mod probe;
 mod render;
 mod reporter;
 mod scene;
+mod solve;
 mod transport;
 
 pub use exit::ExitCode;
@@ -35,7 +37,9 @@ struct Arguments {
 #[derive(clap::Subcommand)]
 enum Verb {
     Render(render::Render),
+    Solve(solve::Solve),
     Probe(probe::Probe),
+    Check(check::Check),
     Diff(diff::Diff),
 }
 
@@ -96,7 +100,9 @@ pub fn run_with(
     let started = Instant::now();
     let outcome = match arguments.verb {
         Verb::Render(verb) => verb.run(&mut session),
+        Verb::Solve(verb) => verb.run(&mut session),
         Verb::Probe(verb) => verb.run(&mut session),
+        Verb::Check(verb) => verb.run(&mut session),
         Verb::Diff(verb) => verb.run(&mut session),
     };
     let seconds = started.elapsed().as_secs_f64();

@@ -38,12 +38,23 @@ pub(super) struct Transport {
 }
 
 /// What solutions are for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Purpose {
     /// To be looked up by a gather; this many independent ones.
     Gather(u32),
     /// To be shown.
     View,
+    /// To be reported.
+    Solve {
+        /// How finely to mesh.
+        size: PatchSize,
+        /// Rays of each row.
+        rays: usize,
+        /// Bound on the error that the iteration may leave, relative to the brightest patch.
+        tolerance: f64,
+        /// Independent solutions.
+        replicates: u32,
+    },
 }
 
 impl Transport {
@@ -53,12 +64,23 @@ impl Transport {
         purpose: Purpose,
         context: &Context<'_>,
     ) -> Result<Self, Failure> {
-        let (count, rays, replicates) = match purpose {
-            Purpose::Gather(replicates) => (GATHER_PATCHES, GATHER_ROW_RAYS, replicates),
-            Purpose::View => (VIEW_PATCHES, VIEW_ROW_RAYS, 1),
+        let (size, rays, tolerance, replicates) = match purpose {
+            Purpose::Gather(replicates) => (
+                PatchSize::Count(GATHER_PATCHES),
+                GATHER_ROW_RAYS,
+                TOLERANCE,
+                replicates,
+            ),
+            Purpose::View => (PatchSize::Count(VIEW_PATCHES), VIEW_ROW_RAYS, TOLERANCE, 1),
+            Purpose::Solve {
+                size,
+                rays,
+                tolerance,
+                replicates,
+            } => (size, rays, tolerance, replicates),
         };
         let reporter = &context.reporter;
-        let patches = world.mesh(PatchSize::Count(count))?;
+        let patches = world.mesh(size)?;
         reporter.start("solving radiosity", u64::from(replicates));
         let mut solutions = Vec::new();
         for replicate in 0..replicates {
@@ -66,7 +88,7 @@ impl Transport {
                 rays,
                 shadow_rays: SHADOW_RAYS,
                 solver: Config {
-                    tolerance: Tolerance::Error(TOLERANCE),
+                    tolerance: Tolerance::Error(tolerance),
                     max_iterations: MAX_ITERATIONS,
                 },
                 seed: context.common.seed,
