@@ -19,10 +19,10 @@ const GATHER_ROW_RAYS: usize = 64;
 const SHADOW_RAYS: usize = 4;
 
 /// Patches of a solution that is shown itself: the picture has no finer detail.
-const VIEW_PATCHES: usize = 16_000;
+const VIEW_PATCHES: usize = 10_000;
 
 /// Rays of a row in a solution that is shown itself, where noise is seen as mottling.
-const VIEW_ROW_RAYS: usize = 512;
+const VIEW_ROW_RAYS: usize = 256;
 
 /// Bound on the error that the iteration may leave, relative to the brightest patch: small beside
 /// every other error, and cheap.

@@ -1,0 +1,437 @@
+//! The command from its arguments to its exit code, stdout, stderr and files.
+
+use super::*;
+use crate::image::Image;
+use crate::image::exr::{Picture, encode, read};
+use std::fs;
+use std::path::PathBuf;
+
+/// Runs the command and returns exit code, stdout and stderr.
+fn luxel(args: &[&str]) -> (ExitCode, String, String) {
+    let (mut stdout, mut stderr) = (Vec::new(), Vec::new());
+    let args = std::iter::once("luxel").chain(args.iter().copied());
+    let exit = run(args, &mut stdout, &mut stderr);
+    let text = |bytes| String::from_utf8(bytes).expect("text");
+    (exit, text(stdout), text(stderr))
+}
+
+fn json(stdout: &str) -> serde_json::Value {
+    serde_json::from_str(stdout).expect("JSON on stdout")
+}
+
+/// The path of an example scene.
+fn example(name: &str) -> String {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/data");
+    format!("{folder}/{name}/{name}.toml")
+}
+
+/// A temporary folder with files.
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().expect("a temporary folder"))
+    }
+
+    fn path(&self, name: &str) -> String {
+        let path: PathBuf = self.0.path().join(name);
+        path.to_str().expect("a text path").to_owned()
+    }
+
+    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> String {
+        let path = self.path(name);
+        fs::write(&path, content).expect("a writable folder");
+        path
+    }
+
+    /// A scene of one dark square, seen from above.
+    fn dark_scene(&self) -> String {
+        self.write(
+            "dark.obj",
+            "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n",
+        );
+        self.write(
+            "dark.toml",
+            "geometry = [\"dark.obj\"]\n[[camera]]\nname = \"top\"\nposition = [0.5, 0.5, 2]\n\
+             look_at = [0.5, 0.5, 0]\nup = [0, 1, 0]\nfov = 40\nfov_axis = \"x\"\nsize = [8, 8]\n",
+        )
+    }
+
+    fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.0.path()).expect("a folder");
+        let mut names: Vec<String> = entries
+            .map(|entry| entry.expect("an entry").file_name())
+            .map(|name| name.to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+#[test]
+fn the_arguments_are_consistent() {
+    use clap::CommandFactory;
+    Arguments::command().debug_assert();
+}
+
+#[test]
+fn help_and_version_are_results() {
+    let (exit, stdout, stderr) = luxel(&["--version"]);
+    assert_eq!((exit, stderr.as_str()), (ExitCode::Ok, ""));
+    assert!(stdout.starts_with("luxel "));
+    for verb in ["render", "solve", "probe", "check", "diff"] {
+        let (exit, stdout, _) = luxel(&[verb, "--help"]);
+        assert_eq!(exit, ExitCode::Ok);
+        assert!(stdout.contains("--seed"), "{verb}");
+    }
+}
+
+#[test]
+fn usage_errors_exit_with_2_and_leave_stdout_empty() {
+    let scene = example("furnace");
+    for args in [
+        &[][..],
+        &["frobnicate"],
+        &["diff"],
+        &["diff", "a.exr", "b.exr", "-j", "0"],
+        &["diff", "a.exr", "b.exr", "--max-rel-rmse", "-1"],
+        &["render", &scene],
+        &["render", &scene, "-o", "picture.png"],
+        &["render", &scene, "-o", "a.exr", "--size", "10"],
+        &["render", &scene, "-o", "a.exr", "--spp", "0"],
+        &["render", &scene, "-o", "a.exr", "--max-distance", "1"],
+        &["render", &scene, "-o", "a.exr", "--png", "a.exr"],
+        &["probe", &scene, "--points", "p.csv", "--max-distance", "1"],
+        &["solve", &scene, "--patch-size", "-1"],
+        &["solve", &scene, "--tolerance", "nan"],
+    ] {
+        let (exit, stdout, stderr) = luxel(args);
+        assert_eq!((exit, stdout.as_str()), (ExitCode::Usage, ""), "{args:?}");
+        assert!(!stderr.is_empty());
+    }
+}
+
+#[test]
+fn a_closed_stdout_is_no_failure() {
+    struct Closed;
+    impl Write for Closed {
+        fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+            Err(std::io::ErrorKind::BrokenPipe.into())
+        }
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+    let scene = example("furnace");
+    for args in [&["luxel", "--help"][..], &["luxel", "check", &scene]] {
+        let mut stderr = Vec::new();
+        let exit = run(args.iter().copied(), &mut Closed, &mut stderr);
+        assert_eq!(exit, ExitCode::Ok);
+    }
+}
+
+#[test]
+fn outputs_are_refused_before_the_work_and_named() {
+    let folder = Folder::new();
+    let missing = folder.path("missing/a.exr");
+    let (exit, stdout, stderr) = luxel(&["render", &example("furnace"), "-o", &missing]);
+    assert_eq!((exit, stdout.as_str()), (ExitCode::Failure, ""));
+    assert!(
+        stderr.contains("missing/a.exr") && stderr.contains("mkdir -p"),
+        "{stderr}"
+    );
+}
+
+#[test]
+fn inputs_that_are_missing_wrong_or_empty_have_their_exit_codes() {
+    let folder = Folder::new();
+    let out = folder.path("a.exr");
+    let (exit, _, stderr) = luxel(&["render", "missing.toml", "-o", &out]);
+    assert!(stderr.starts_with("error: ") && stderr.contains("missing.toml"));
+    assert_ne!(exit, ExitCode::Ok);
+    let broken = folder.write("broken.toml", "geometry = [\"x.obj\"]\nbananas = 1\n");
+    let (exit, _, stderr) = luxel(&["check", &broken]);
+    assert_eq!(exit, ExitCode::InvalidInput);
+    assert!(
+        stderr.contains("broken.toml") && stderr.contains('2'),
+        "{stderr}"
+    );
+
+    let dark = folder.dark_scene();
+    let (exit, _, stderr) = luxel(&["render", &dark, "-o", &out]);
+    assert_eq!(exit, ExitCode::NothingToDo, "{stderr}");
+    let (exit, _, stderr) = luxel(&["solve", &dark]);
+    assert_eq!(exit, ExitCode::NothingToDo, "{stderr}");
+    let (exit, _, stderr) = luxel(&["render", &dark, "-o", &out, "--camera", "nobody"]);
+    assert_eq!(exit, ExitCode::Usage);
+    assert!(stderr.contains("nobody") && stderr.contains("top"));
+
+    let furnace = example("furnace");
+    let probe = |points: &str| {
+        let points = folder.write("points.csv", points);
+        luxel(&["probe", &furnace, "--points", &points])
+    };
+    let (exit, _, stderr) = probe("x,y,z,nx,ny,nz\n");
+    assert_eq!(exit, ExitCode::NothingToDo, "{stderr}");
+    let (exit, _, stderr) = probe("x,y,z,nx,ny,nz\n0,0,0,0,0,0\n");
+    assert_eq!(exit, ExitCode::InvalidInput);
+    assert!(stderr.contains("points.csv, line 2"), "{stderr}");
+    let (exit, ..) = luxel(&["probe", &furnace, "--points", "missing.csv"]);
+    assert_eq!(exit, ExitCode::Failure);
+}
+
+#[test]
+fn every_integrator_writes_a_picture_of_the_furnace() {
+    let folder = Folder::new();
+    let (exr, png) = (folder.path("a.exr"), folder.path("a.png"));
+    for (integrator, expected) in [
+        ("radiosity", 2.0),
+        ("gather", 2.0),
+        ("whitted", 2.0),
+        ("path", 2.0),
+        // A closed box: everything is occluded.
+        ("ao", 0.0),
+    ] {
+        let (exit, stdout, stderr) = luxel(&[
+            "render",
+            &example("furnace"),
+            "-o",
+            &exr,
+            "--png",
+            &png,
+            "--size",
+            "8x6",
+            "--spp",
+            "16",
+            "--integrator",
+            integrator,
+        ]);
+        assert_eq!(exit, ExitCode::Ok, "{stderr}");
+        assert_eq!(stdout, format!("{exr}\n{png}\n"));
+        let picture = read(std::path::Path::new(&exr)).expect("an EXR file");
+        assert_eq!((picture.image.width, picture.image.height), (8, 6));
+        let origin = picture.origin.expect("luxel says where a picture is from");
+        assert_eq!(
+            (origin.integrator.as_str(), origin.samples),
+            (integrator, 16)
+        );
+        assert_eq!(picture.layers[0].0, "standard_error");
+        let values = picture.image.pixels.iter().flatten();
+        let mean = values.map(|&v| f64::from(v)).sum::<f64>() / (3.0 * 48.0);
+        // The noisiest is the path tracer: 0.6 % of the mean, from the standard error layer.
+        assert!((mean - expected).abs() < 0.05, "{integrator}: {mean}");
+    }
+    assert_eq!(folder.names(), ["a.exr", "a.png"], "nothing is left behind");
+}
+
+#[test]
+fn the_bytes_do_not_depend_on_the_number_of_threads() {
+    let folder = Folder::new();
+    let cornell = example("cornell");
+    let points = folder.write(
+        "points.csv",
+        "x,y,z,nx,ny,nz\n0.2,0,0.2,0,1,0\n0.3,0.5487,0.1,0,-1,0\n",
+    );
+    let run = |threads: &str, args: &[&str]| {
+        let mut all = args.to_vec();
+        all.extend(["-j", threads, "--seed", "7"]);
+        let (exit, stdout, stderr) = luxel(&all);
+        assert_eq!(exit, ExitCode::Ok, "{stderr}");
+        stdout
+    };
+    for integrator in ["radiosity", "gather", "path"] {
+        let picture = |threads: &str| {
+            let out = folder.path(&format!("{threads}.exr"));
+            let args = [
+                "render", &cornell, "-o", &out, "--size", "24x24", "--spp", "4",
+            ];
+            run(
+                threads,
+                &[&args[..], &["--integrator", integrator]].concat(),
+            );
+            fs::read(out).expect("a picture")
+        };
+        assert!(picture("1") == picture("2"), "{integrator}");
+    }
+    for more in [
+        &["--rays", "64"][..],
+        &["--integrator", "path", "--rays", "64"],
+        &["--quantity", "ao", "--rays", "64"],
+    ] {
+        let args = [&["probe", &cornell, "--points", &points][..], more].concat();
+        let table = run("1", &args);
+        assert_eq!(table.lines().count(), 3);
+        assert_eq!(table, run("2", &args));
+    }
+    let solve = |threads: &str| {
+        let args = ["solve", &cornell, "--json", "--rays", "16"];
+        let mut result = json(&run(threads, &args));
+        result.as_object_mut().map(|map| map.remove("seconds"));
+        result
+    };
+    assert_eq!(solve("1"), solve("2"));
+}
+
+#[test]
+fn probes_keep_their_columns_and_tell_components_apart() {
+    let folder = Folder::new();
+    let points = folder.write("p.csv", "id,x,y,z,nx,ny,nz\na,1,0,1,0,2,0\n");
+    let out = folder.path("out.csv");
+    let value = |components: &str| {
+        let (exit, stdout, stderr) = luxel(&[
+            "probe",
+            &example("furnace"),
+            "--points",
+            &points,
+            "-o",
+            &out,
+            "--components",
+            components,
+        ]);
+        assert_eq!(
+            (exit, stdout),
+            (ExitCode::Ok, format!("{out}\n")),
+            "{stderr}"
+        );
+        let table = fs::read_to_string(&out).expect("a table");
+        let lines: Vec<&str> = table.lines().collect();
+        assert_eq!(lines[0], "id,x,y,z,nx,ny,nz,e_r,e_g,e_b,se_r,se_g,se_b");
+        assert!(lines[1].starts_with("a,1,0,1,0,2,0,"));
+        let field = lines[1].split(',').nth(7).expect("e_r");
+        field.parse::<f64>().expect("a number")
+    };
+    // E = 2π, half of it direct; what is left is the noise of shadow rays and near chains.
+    let pi = std::f64::consts::PI;
+    let [all, direct, indirect] = ["all", "direct", "indirect"].map(value);
+    assert!((all - 2.0 * pi).abs() < 0.02 * pi, "{all}");
+    assert!((direct - pi).abs() < 0.01 * pi, "{direct}");
+    assert!((indirect - pi).abs() < 0.02 * pi, "{indirect}");
+}
+
+#[test]
+fn solve_reports_objects_energy_and_a_mesh() {
+    let folder = Folder::new();
+    let mesh = folder.path("mesh.ply");
+    let (exit, stdout, stderr) = luxel(&[
+        "solve",
+        &example("furnace"),
+        "--json",
+        "--patch-size",
+        "whole",
+        "-o",
+        &mesh,
+    ]);
+    assert_eq!(exit, ExitCode::Ok, "{stderr}");
+    let result = json(&stdout);
+    assert_eq!(result["patches"], 192);
+    let two_pi = 2.0 * std::f64::consts::PI;
+    // Closed, M = π and ρ = 1/2: E = B = 2π everywhere, up to the tolerance of 1e-7.
+    for quantity in ["radiosity", "irradiance"] {
+        let value = result["objects"]["walls"][quantity][1].as_f64();
+        let value = value.expect("a number");
+        assert!((value / two_pi - 1.0).abs() < 1e-7, "{quantity}: {value}");
+    }
+    let energy = |key: &str| result["energy"][key][0].as_f64().expect("a number");
+    let balance = energy("emitted") - energy("absorbed") - energy("escaped") - energy("residual");
+    assert!(balance.abs() < 1e-9 * energy("emitted"), "{balance}");
+    assert!(energy("escaped").abs() < 1e-9, "a closed scene");
+    assert!(
+        result["error"]["solver"]
+            .as_f64()
+            .is_some_and(|e| e <= 1e-7)
+    );
+    assert!(result["seconds"]["total"].is_number());
+    let bytes = fs::read(mesh).expect("a mesh");
+    assert!(bytes.starts_with(b"ply\n"));
+    let (exit, stdout, _) = luxel(&["solve", &example("furnace"), "--rays", "16"]);
+    assert_eq!(exit, ExitCode::Ok);
+    assert!(stdout.contains("walls") && stdout.contains("escaped"));
+}
+
+#[test]
+fn check_tells_notes_from_warnings() {
+    let folder = Folder::new();
+    let (exit, stdout, _) = luxel(&["check", &example("furnace"), "--strict"]);
+    assert_eq!(
+        (exit, stdout.as_str()),
+        (ExitCode::Ok, "nothing suspicious\n")
+    );
+    let (exit, stdout, _) = luxel(&["check", &example("cornell"), "--strict", "--json"]);
+    assert_eq!(exit, ExitCode::Ok, "an open front is a note");
+    let result = json(&stdout);
+    assert_eq!(result["warnings"], 0);
+    assert!(result["notes"].as_u64().is_some_and(|notes| notes > 0));
+    // The same square twice.
+    let doubled = folder.write(
+        "doubled.obj",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nf 1 2 3 4\n",
+    );
+    let (exit, stdout, _) = luxel(&["check", &doubled, "--strict"]);
+    assert_eq!(exit, ExitCode::LimitExceeded);
+    assert!(stdout.contains("warning: "), "{stdout}");
+}
+
+#[test]
+fn diff_measures_and_limits() {
+    let folder = Folder::new();
+    let write = |name: &str, width: usize, value: f32| {
+        let picture = Picture {
+            image: Image {
+                width,
+                height: 2,
+                pixels: vec![[value; 3]; width * 2],
+            },
+            layers: vec![],
+            origin: None,
+        };
+        folder.write(name, encode(&picture).expect("encodable"))
+    };
+    let one = write("one.exr", 2, 1.0);
+    let more = write("more.exr", 2, 1.1);
+    let wide = write("wide.exr", 3, 1.0);
+
+    let (exit, stdout, _) = luxel(&["diff", &more, &one, "--json"]);
+    assert_eq!(exit, ExitCode::Ok);
+    let result = json(&stdout);
+    // 10 % in f32, and the regulariser 0.01² in the relative form.
+    let near = |key: &str, expected: f64| {
+        let value = result[key].as_f64().expect("a number");
+        assert!((value - expected).abs() < 1e-6, "{key}: {value}");
+    };
+    near("rmse", 0.1);
+    near("rel_rmse", 0.1 / 1.0001_f64.sqrt());
+    near("bias", 0.1);
+    near("max", 0.1);
+
+    let (exit, stdout, _) = luxel(&["diff", &more, &one, "--max-rel-rmse", "0.2"]);
+    assert_eq!(exit, ExitCode::Ok);
+    assert!(stdout.starts_with("RMSE"));
+    let (exit, ..) = luxel(&["diff", &more, &one, "--max-rel-rmse", "0.05"]);
+    assert_eq!(exit, ExitCode::LimitExceeded);
+    let (exit, stdout, stderr) = luxel(&["diff", &wide, &one]);
+    assert_eq!((exit, stdout.as_str()), (ExitCode::InvalidInput, ""));
+    assert!(stderr.contains("3x2 against 2x2"));
+    let (exit, _, stderr) = luxel(&["diff", "missing.exr", &one]);
+    assert_eq!(exit, ExitCode::Failure);
+    assert!(stderr.contains("missing.exr") && stderr.contains("because"));
+}
+
+#[test]
+fn progress_and_summaries_stay_out_of_stdout() {
+    let scene = example("furnace");
+    let (exit, stdout, stderr) = luxel(&[
+        "solve",
+        &scene,
+        "--json",
+        "--rays",
+        "8",
+        "--progress",
+        "json",
+        "-v",
+    ]);
+    assert_eq!(exit, ExitCode::Ok);
+    assert!(json(&stdout).is_object());
+    assert!(stderr.lines().any(|line| line.starts_with("{\"done\":0")));
+    let (_, _, stderr) = luxel(&["solve", &scene, "--rays", "8", "-q"]);
+    assert_eq!(stderr, "");
+}
