@@ -2,4 +2,5 @@
 
 mod enclosures;
 mod form_factors;
+mod hemicube;
 mod sampling;

@@ -25,7 +25,7 @@
 //! theorem 4.5. Valid for polygons entirely in front of each other. Cost: about 4 ns per pair of
 //! points, or one Lambert formula per point.
 
-use super::gauss::gauss;
+use super::gauss::{Node, gauss};
 use super::point_to_polygon::point_to_polygon;
 use super::polygon::Polygon;
 use glam::DVec3;
@@ -105,21 +105,27 @@ pub(super) fn orders(quad: &Quad, distance: f64, view: &View, accuracy: f64) -> 
     ])
 }
 
-/// Calls `visit` with each point of the product rule on a quadrilateral in the plane of `normal` and
-/// its weight in m².
-pub(super) fn points(
+/// Calls `visit` with each point of the product of Gauss rules on a quadrilateral in the plane of
+/// `normal` and its weight in m².
+pub(super) fn points(quad: &Quad, normal: DVec3, orders: Orders, visit: impl FnMut(DVec3, f64)) {
+    points_of(quad, normal, gauss(orders[0]), gauss(orders[1]), visit);
+}
+
+/// The same for any two rules on [0, 1].
+pub(super) fn points_of(
     quad: &Quad,
     normal: DVec3,
-    orders: Orders,
+    rule_u: &[Node],
+    rule_v: &[Node],
     mut visit: impl FnMut(DVec3, f64),
 ) {
     let [a, b, c, d] = *quad;
     let (ab, dc, ad) = (b - a, c - d, d - a);
     let twist = dc - ab;
-    for &(v, wv) in gauss(orders[1]) {
+    for &(v, wv) in rule_v {
         let along_u = ab + twist * v;
         let start = a + ad * v;
-        for &(u, wu) in gauss(orders[0]) {
+        for &(u, wu) in rule_u {
             let along_v = ad + twist * u;
             let jacobian = along_u.cross(along_v).dot(normal);
             visit(start + along_u * u, wu * wv * jacobian);

@@ -9,6 +9,7 @@ mod clip;
 mod contour;
 mod edges;
 mod gauss;
+mod hemicube;
 mod point_to_polygon;
 mod polygon;
 mod polygon_to_polygon;
@@ -18,6 +19,7 @@ mod report;
 
 pub use assembly::unoccluded_matrix;
 pub use clip::{Plane, clip};
+pub use hemicube::{Facet, Hemicube, HemicubeConfig, hemicube};
 pub use point_to_polygon::point_to_polygon;
 pub use polygon::{Polygon, PolygonError};
 pub use polygon_to_polygon::{exchange_area, polygon_to_polygon};
