@@ -130,8 +130,11 @@ fn cast_part(
         for point in 0..points as u32 {
             let surface = patches.sample(geometry, patch, positions.point2(point));
             let frame = sampling::Frame::around(surface.normal.as_vec3());
-            for k in [2 * point, 2 * point + 1] {
-                let local = cosine_hemisphere::sample(directions.point2_f32(k));
+            // Four dimensions, not two consecutive points of two: those lie in opposite halves of
+            // the square, and the class that a ray's partner speaks for must not depend on it.
+            let [a, b, c, d] = directions.point4_f32(point);
+            for u in [[a, b], [c, d]] {
+                let local = cosine_hemisphere::sample(u);
                 rays.push(Ray::new(surface.origin, frame.to_world(local)));
             }
             samples.push(Sample {
