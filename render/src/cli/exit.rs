@@ -88,6 +88,8 @@ exits_with! {
     luxel_solver::solvers::SystemError => InvalidInput,
     crate::ply::TooManyCorners => Failure,
     csv::Error => Failure,
+    std::io::Error => Failure,
+    luxel_solver::transport::DenseError => Failure,
     serde_json::Error => Failure,
     rayon::ThreadPoolBuildError => Failure,
 }

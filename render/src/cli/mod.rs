@@ -7,6 +7,7 @@ mod check;
 mod common;
 mod diff;
 mod exit;
+mod form_factors;
 mod probe;
 mod render;
 mod reporter;
@@ -39,6 +40,7 @@ enum Verb {
     Render(render::Render),
     Solve(solve::Solve),
     Probe(probe::Probe),
+    FormFactors(form_factors::FormFactors),
     Check(check::Check),
     Diff(diff::Diff),
 }
@@ -102,6 +104,7 @@ pub fn run_with(
         Verb::Render(verb) => verb.run(&mut session),
         Verb::Solve(verb) => verb.run(&mut session),
         Verb::Probe(verb) => verb.run(&mut session),
+        Verb::FormFactors(verb) => verb.run(&mut session),
         Verb::Check(verb) => verb.run(&mut session),
         Verb::Diff(verb) => verb.run(&mut session),
     };

@@ -79,7 +79,7 @@ fn help_and_version_are_results() {
     let (exit, stdout, stderr) = luxel(&["--version"]);
     assert_eq!((exit, stderr.as_str()), (ExitCode::Ok, ""));
     assert!(stdout.starts_with("luxel "));
-    for verb in ["render", "solve", "probe", "check", "diff"] {
+    for verb in ["render", "solve", "probe", "form-factors", "check", "diff"] {
         let (exit, stdout, _) = luxel(&[verb, "--help"]);
         assert_eq!(exit, ExitCode::Ok);
         assert!(stdout.contains("--seed"), "{verb}");
@@ -104,6 +104,7 @@ fn usage_errors_exit_with_2_and_leave_stdout_empty() {
         &["probe", &scene, "--points", "p.csv", "--max-distance", "1"],
         &["solve", &scene, "--patch-size", "-1"],
         &["solve", &scene, "--tolerance", "nan"],
+        &["form-factors", &scene, "-o", "f.txt"],
     ] {
         let (exit, stdout, stderr) = luxel(args);
         assert_eq!((exit, stdout.as_str()), (ExitCode::Usage, ""), "{args:?}");
@@ -346,6 +347,55 @@ fn solve_reports_objects_energy_and_a_mesh() {
     let (exit, stdout, _) = luxel(&["solve", &example("furnace"), "--rays", "16"]);
     assert_eq!(exit, ExitCode::Ok);
     assert!(stdout.contains("walls") && stdout.contains("escaped"));
+}
+
+#[test]
+fn form_factors_of_a_cube_are_exact_closed_and_written() {
+    let folder = Folder::new();
+    let furnace = example("furnace");
+    let npy = folder.path("f.npy");
+    let (exit, stdout, stderr) = luxel(&["form-factors", &furnace, "--json", "-o", &npy]);
+    assert_eq!(exit, ExitCode::Ok, "{stderr}");
+    let result = json(&stdout);
+    let objects = result["objects"].as_array().expect("a list");
+    assert_eq!(objects.len(), 3);
+    let place = |name: &str| objects.iter().position(|o| o == name).expect("an object");
+    let (floor, ceiling) = (place("floor"), place("ceiling"));
+    let number = |value: &serde_json::Value| value.as_f64().expect("a number");
+    // Opposite faces of a cube (Howell C-11); 192 triangles of a relative accuracy of 1e-12 each.
+    let opposite = number(&result["F"][floor][ceiling]);
+    assert!(
+        (opposite - 0.199_824_895_698_387_1).abs() < 1e-11,
+        "{opposite}"
+    );
+    for row in 0..3 {
+        assert!(
+            (number(&result["row_sums"][row]) - 1.0).abs() < 1e-11,
+            "row {row}"
+        );
+    }
+    assert!(number(&result["reciprocity"]) < 1e-14);
+    assert_eq!(number(&result["standard_error"][floor][ceiling]), 0.0);
+    assert!(fs::read(npy).expect("a file").starts_with(b"\x93NUMPY"));
+
+    let args = [
+        "form-factors",
+        &furnace,
+        "--method",
+        "raycast",
+        "--json",
+        "--rays",
+        "65536",
+    ];
+    let (exit, stdout, stderr) = luxel(&args);
+    assert_eq!(exit, ExitCode::Ok, "{stderr}");
+    let cast = json(&stdout);
+    let difference = number(&cast["F"][floor][ceiling]) - opposite;
+    let error = number(&cast["standard_error"][floor][ceiling]);
+    assert!(
+        error > 0.0 && difference.abs() < 4.0 * error,
+        "{difference} +- {error}"
+    );
 }
 
 #[test]

@@ -5,6 +5,7 @@
 
 mod area;
 mod assembly;
+mod between_objects;
 mod clip;
 mod contour;
 mod edges;
@@ -18,6 +19,7 @@ mod repair;
 mod report;
 
 pub use assembly::unoccluded_matrix;
+pub use between_objects::{ObjectFactors, analytic_between_objects, ray_cast_between_objects};
 pub use clip::{Plane, clip};
 pub use hemicube::{Facet, Hemicube, HemicubeConfig, hemicube};
 pub use point_to_polygon::point_to_polygon;
