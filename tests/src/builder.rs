@@ -107,13 +107,15 @@ pub fn solid_box(lower: DVec3, upper: DVec3) -> Vec<Polygon> {
 /// about (π / segments)²/2 of itself.
 pub fn sphere(centre: DVec3, radius: f64, segments: usize) -> Vec<Polygon> {
     let point = |ring: usize, segment: usize| {
-        let theta = PI * ring as f64 / (segments / 2) as f64;
+        let (sin, cos) = (PI * ring as f64 / (segments / 2) as f64).sin_cos();
+        // All segments share the poles to the bit, where the sine of π is not quite zero.
+        let sin = if ring.is_multiple_of(segments / 2) {
+            0.0
+        } else {
+            sin
+        };
         let phi = TAU * (segment % segments) as f64 / segments as f64;
-        let direction = DVec3::new(
-            theta.sin() * phi.cos(),
-            theta.sin() * phi.sin(),
-            theta.cos(),
-        );
+        let direction = DVec3::new(sin * phi.cos(), sin * phi.sin(), cos);
         centre + direction * radius
     };
     let rings = segments / 2;

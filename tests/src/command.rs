@@ -15,15 +15,13 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// The outcome itself when the command succeeded.
+    /// Panics with the command's own message unless it succeeded.
     ///
     /// # Panics
-    /// When it did not; the message is the command's own.
-    #[must_use]
+    /// When the command failed.
     #[track_caller]
-    pub fn succeeded(self) -> Self {
+    pub fn assert_success(&self) {
         assert_eq!(self.exit, ExitCode::Ok, "luxel failed: {}", self.stderr);
-        self
     }
 
     /// stdout as JSON.

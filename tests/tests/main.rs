@@ -1,6 +1,9 @@
 //! The integration tests of luxel, one module per subject.
 
+mod ambient_occlusion;
 mod enclosures;
 mod form_factors;
 mod hemicube;
+mod irradiance_fields;
 mod sampling;
+mod stress_rays;
