@@ -1,7 +1,10 @@
 //! Form factors against exact values: pairs of polygons, elements, closed rooms.
 
 use glam::DVec3;
-use luxel_solver::form_factors::{Polygon, exchange_area, point_to_polygon, polygon_to_polygon};
+use luxel_solver::form_factors::{
+    AnalyticConfig, Polygon, exchange_area, occluded_exchange_area, point_to_polygon,
+    polygon_to_polygon,
+};
 use luxel_tests::cases;
 use serde::Deserialize;
 
@@ -146,4 +149,50 @@ fn closed_rooms_have_their_matrix_and_rows_that_sum_to_one() {
             );
         }
     }
+}
+
+#[test]
+fn occluded_pairs_are_right_within_their_stated_error() {
+    let file: File = cases::load("viewfactors.json");
+    let config = AnalyticConfig {
+        accuracy: ACCURACY,
+        points: 4096,
+        seed: 0,
+    };
+    let mut checked = 0;
+    for (item, case) in file.cases.iter().enumerate() {
+        let (Surface::Polygon { vertices: from }, Surface::Polygon { vertices: to }) =
+            (&case.from, &case.to)
+        else {
+            continue;
+        };
+        let occluders: Vec<Polygon> = case
+            .occluders
+            .iter()
+            .filter_map(|occluder| match occluder {
+                Surface::Polygon { vertices } => Some(polygon(vertices)),
+                _ => None,
+            })
+            .collect();
+        if occluders.is_empty() {
+            continue;
+        }
+        let (from, to) = (polygon(from), polygon(to));
+        let s = occluded_exchange_area(&from, &to, &occluders, &config, item as u64);
+        let (f, error) = (s.area / from.area(), s.standard_error / from.area());
+        if case.value == 0.0 {
+            assert_eq!(f.to_bits(), 0, "{}: full cover hides all", case.id);
+            checked += 1;
+            continue;
+        }
+        // Eight shifts leave seven degrees of freedom: six standard errors are passed once in two
+        // thousand pairs.
+        let e = (f - case.value).abs();
+        assert!(e <= 6.0 * error, "{}: {f}, {e:e} with {error:e}", case.id);
+        // A blocker 2^-10 above P makes a step of F across P, worth 2/M; shadows of edges are kinks.
+        assert!(e <= 4e-3 * case.value, "{}: {f}, {e:e}", case.id);
+        assert!(error <= 4e-3 * case.value, "{}: {error:e}", case.id);
+        checked += 1;
+    }
+    assert!(checked >= 5, "the file holds occluded pairs: {checked}");
 }

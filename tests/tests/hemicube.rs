@@ -1,7 +1,7 @@
 //! Hemicube form factors against exact values: the error falls with the resolution.
 
 use glam::DVec3;
-use luxel_solver::form_factors::{Facet, HemicubeConfig, Polygon, hemicube};
+use luxel_solver::form_factors::{Facet, FacetSide, HemicubeConfig, Polygon, hemicube};
 use luxel_tests::cases;
 use serde::Deserialize;
 
@@ -77,11 +77,14 @@ fn estimate(case: &Case, resolution: usize) -> f64 {
         vertices: Polygon::vertices(polygon),
         normal: polygon.normal(),
         front,
-        back: None,
+        back: FacetSide::Black,
     };
     // Only the row of the first is wanted: the second takes its place as the one patch that counts.
-    let mut facets = vec![facet(&case.pair[0], None), facet(&case.pair[1], Some(0))];
-    facets.extend(case.occluders.iter().map(|o| facet(o, None)));
+    let mut facets = vec![
+        facet(&case.pair[0], FacetSide::Black),
+        facet(&case.pair[1], FacetSide::Counted(0)),
+    ];
+    facets.extend(case.occluders.iter().map(|o| facet(o, FacetSide::Black)));
     let config = HemicubeConfig::balanced(resolution);
     hemicube(&case.pair[..1], &facets, &config).get(0, 0)
 }

@@ -2,8 +2,9 @@
 //!
 //! Each exchange area S_ij = A_i F_ij is computed once, so that A_i F_ij = A_j F_ji holds to the rounding
 //! of two divisions. Valid for scenes in which nothing stands between two polygons, such as the inside
-//! of a convex room; else see `visibility`. Cost: n²/2 pairs, in parallel, and 8n² bytes.
+//! of a convex room; else see `occluded`. Cost: n²/2 pairs, in parallel, and 8n² bytes.
 
+use super::occluded::{AnalyticFactors, Exchange};
 use super::polygon::Polygon;
 use super::polygon_to_polygon::exchange_area;
 use crate::transport::Dense;
@@ -11,36 +12,40 @@ use rayon::prelude::*;
 
 /// F between all polygons with nothing between them, to a relative `accuracy` of each entry.
 pub fn unoccluded_matrix(polygons: &[Polygon], accuracy: f64) -> Dense {
-    symmetric_matrix(polygons, |i, j| {
-        exchange_area(&polygons[i], &polygons[j], accuracy)
-    })
+    let areas: Vec<f64> = polygons.iter().map(Polygon::area).collect();
+    let exchange = |i: usize, j: usize| Exchange {
+        area: exchange_area(&polygons[i], &polygons[j], accuracy),
+        standard_error: 0.0,
+    };
+    exchange_matrix(&areas, exchange).matrix
 }
 
-/// F from the exchange areas S_ij (m²) of pairs i < j.
-pub(super) fn symmetric_matrix(
-    polygons: &[Polygon],
-    exchange: impl Fn(usize, usize) -> f64 + Sync,
-) -> Dense {
-    let n = polygons.len();
-    let mut entries = vec![0.0; n * n];
+/// F and its standard errors from the areas A_i (m²) and the exchange areas of pairs i < j.
+pub(super) fn exchange_matrix(
+    areas: &[f64],
+    exchange: impl Fn(usize, usize) -> Exchange + Sync,
+) -> AnalyticFactors {
+    let n = areas.len();
     // Rows get shorter: single ones are handed out, so that no thread is left with the long ones.
-    entries
-        .par_chunks_mut(n.max(1))
-        .enumerate()
+    let rows: Vec<Vec<Exchange>> = (0..n)
+        .into_par_iter()
         .with_max_len(1)
-        .for_each(|(i, row)| {
-            for (j, entry) in row.iter_mut().enumerate().skip(i + 1) {
-                *entry = exchange(i, j);
+        .map(|i| (i + 1..n).map(|j| exchange(i, j)).collect())
+        .collect();
+    let mut factors = vec![0.0; n * n];
+    let mut errors = vec![0.0; n * n];
+    for (i, row) in rows.iter().enumerate() {
+        for (j, s) in (i + 1..n).zip(row) {
+            for (from, to) in [(i, j), (j, i)] {
+                factors[from * n + to] = s.area / areas[from];
+                errors[from * n + to] = s.standard_error / areas[from];
             }
-        });
-    for i in 0..n {
-        for j in i + 1..n {
-            let s = entries[i * n + j];
-            entries[i * n + j] = s / polygons[i].area();
-            entries[j * n + i] = s / polygons[j].area();
         }
     }
-    Dense::new(n, entries).expect("exchange areas are finite and not negative")
+    AnalyticFactors {
+        matrix: Dense::new(n, factors).expect("exchange areas are finite and not negative"),
+        standard_error: errors,
+    }
 }
 
 #[cfg(test)]

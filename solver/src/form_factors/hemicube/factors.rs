@@ -1,21 +1,15 @@
 //! Form factors between patches by hemicubes at several origins on each.
 //!
-//! F_ij = (1/A_i) ∫ F(x → j) dA over M origins x in a Fibonacci lattice, places (k/M, k F/M) with M and F
-//! neighbouring Fibonacci numbers, each coordinate mapped by t − sin(2πt)/2π. The map makes the integrand
-//! periodic and crowds origins towards the edges as their distance cubed, where F varies quickly next to
-//! touching or nearly touching patches; the lattice shows M different values in each coordinate, so
-//! that steps of F (the shadow of an edge) cost O(1/M), kinks O(1/M²), and smooth functions less.
-//!
-//! Sources: I. H. Sloan, S. Joe, "Lattice Methods for Multiple Integration", 1994, chapters 2 and 5;
-//! A. Sidi, "A new variable transformation for numerical integration", 1993. Cost: M hemicubes a patch.
+//! F_ij = (1/A_i) ∫ F(x → j) dA over M origins x in a crowded lattice (see `lattice`). Cost: M hemicubes a
+//! patch.
 
-use super::super::area::{points_of, quads};
+use super::super::lattice::lattice;
 use super::super::polygon::Polygon;
 use super::raster::{Facet, Hemicube};
 use crate::transport::Dense;
 use glam::DVec3;
 use rayon::prelude::*;
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::FRAC_PI_2;
 
 /// How fine hemicubes are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,27 +37,48 @@ const SHIFT: [f64; 2] = [0.414_213_562_373_095, 0.236_067_977_499_79];
 /// The golden ratio less one: angles k·φ mod 1 of successive origins are spread evenly.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// F between patches. `facets` are the polygons that are seen and occlude, naming patches by index;
-/// those of the patches themselves are among them.
+/// F between polygons. `facets` are what is seen and occludes, naming polygons by index; those of the
+/// polygons themselves are among them.
 ///
 /// Biased as the module says. Deterministic.
 ///
 /// # Panics
-/// When a facet names a patch that does not exist.
-pub fn hemicube(patches: &[Polygon], facets: &[Facet], config: &HemicubeConfig) -> Dense {
-    let n = patches.len();
+/// When a facet names a polygon that does not exist.
+pub fn hemicube(polygons: &[Polygon], facets: &[Facet], config: &HemicubeConfig) -> Dense {
+    hemicube_rows(polygons.len(), facets, config, |i| &polygons[i..=i])
+}
+
+/// The same between patches of any number of polygons.
+pub(in super::super) fn hemicube_of(
+    patches: &[Vec<Polygon>],
+    facets: &[Facet],
+    config: &HemicubeConfig,
+) -> Dense {
+    hemicube_rows(patches.len(), facets, config, |i| &patches[i])
+}
+
+fn hemicube_rows<'a>(
+    n: usize,
+    facets: &[Facet],
+    config: &HemicubeConfig,
+    patch: impl Fn(usize) -> &'a [Polygon] + Sync,
+) -> Dense {
     let prototype = Hemicube::new(config.resolution);
-    let rows: Vec<Vec<f64>> = patches
-        .par_iter()
+    let rows: Vec<Vec<f64>> = (0..n)
+        .into_par_iter()
         .map_init(
             || prototype.clone(),
-            |cube, patch| {
+            |cube, i| {
                 let mut row = vec![0.0; n];
                 let mut turn = 0.0;
-                for (origin, weight) in origins(patch, config.origins) {
-                    turn = (turn + GOLDEN) % 1.0;
-                    let angle = turn * FRAC_PI_2;
-                    cube.add(origin, patch.normal(), angle, facets, weight, &mut row);
+                let area: f64 = patch(i).iter().map(Polygon::area).sum();
+                for polygon in patch(i) {
+                    for (origin, share) in origins(polygon, config.origins) {
+                        turn = (turn + GOLDEN) % 1.0;
+                        let angle = turn * FRAC_PI_2;
+                        let weight = share * polygon.area() / area;
+                        cube.add(origin, polygon.normal(), angle, facets, weight, &mut row);
+                    }
                 }
                 row
             },
@@ -72,62 +87,21 @@ pub fn hemicube(patches: &[Polygon], facets: &[Facet], config: &HemicubeConfig) 
     Dense::new(n, rows.concat()).expect("pixel form factors are finite and not negative")
 }
 
-/// Origins on a patch, `count` or more on each quadrilateral piece, and their shares, which sum to 1;
-/// a single one is the centre.
+/// Origins on a patch and their shares; a single one is the centre.
 fn origins(patch: &Polygon, count: usize) -> Vec<(DVec3, f64)> {
     if count <= 1 {
-        return vec![(patch.centre(), 1.0)];
+        vec![(patch.centre(), 1.0)]
+    } else {
+        lattice(patch, count, SHIFT)
     }
-    // Neighbouring Fibonacci numbers; below 5 the lattice degenerates to a diagonal.
-    let (mut step, mut points) = (3, 5);
-    while points < count {
-        (step, points) = (points, step + points);
-    }
-    let mut origins = Vec::with_capacity(points);
-    for quad in quads(patch) {
-        for k in 0..points {
-            let place = |multiple: usize, shift: f64| {
-                crowd(((k * multiple) as f64 / points as f64 + shift).fract())
-            };
-            let (u, v) = (place(1, SHIFT[0]), place(step, SHIFT[1]));
-            points_of(&quad, patch.normal(), &[u], &[v], |x, w| {
-                origins.push((x, w));
-            });
-        }
-    }
-    let sum: f64 = origins.iter().map(|(_, w)| w).sum();
-    for (_, weight) in &mut origins {
-        *weight /= sum;
-    }
-    origins
-}
-
-/// x = t − sin(2πt)/2π and dx/dt: crowds towards both ends as their distance cubed.
-fn crowd(t: f64) -> (f64, f64) {
-    let (sin, cos) = (TAU * t).sin_cos();
-    (t - sin / TAU, 1.0 - cos)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::super::{polygon_to_polygon, reciprocity_defect_of_largest};
+    use super::super::raster::FacetSide;
     use super::*;
     use crate::transport::Transport;
-
-    #[test]
-    fn origins_cover_the_patch() {
-        let triangle = [DVec3::ZERO, DVec3::X * 3.0, DVec3::Y];
-        let patch = Polygon::new(&triangle).expect("a triangle");
-        for count in [1, 8, 100] {
-            let origins = origins(&patch, count);
-            let shares: f64 = origins.iter().map(|(_, w)| w).sum();
-            assert!((shares - 1.0).abs() < 1e-14, "{count}: {shares}");
-            let centre: DVec3 = origins.iter().map(|&(x, w)| x * w).sum();
-            // Linear functions on a triangle, smooth after the map: far below 1/M.
-            let tolerance = 0.3 / count as f64;
-            assert!(centre.distance(patch.centre()) <= tolerance, "{count}");
-        }
-    }
 
     #[test]
     fn a_closed_cube_is_closed_exactly_and_right_at_first_order() {
@@ -150,8 +124,8 @@ mod tests {
             .map(|(k, f)| Facet {
                 vertices: f.vertices(),
                 normal: f.normal(),
-                front: Some(k as u32),
-                back: None,
+                front: FacetSide::Counted(k as u32),
+                back: FacetSide::Black,
             })
             .collect();
         for resolution in [32, 64, 128] {

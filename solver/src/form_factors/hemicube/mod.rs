@@ -44,5 +44,6 @@ mod factors;
 mod pixels;
 mod raster;
 
+pub(super) use factors::hemicube_of;
 pub use factors::{HemicubeConfig, hemicube};
-pub use raster::{Facet, Hemicube};
+pub use raster::{Facet, FacetSide, Hemicube};

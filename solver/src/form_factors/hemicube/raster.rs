@@ -17,6 +17,17 @@ use super::super::clip::crossing;
 use super::pixels::Pixels;
 use glam::DVec3;
 
+/// What a side of a polygon does with light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FacetSide {
+    /// It is counted at this index.
+    Counted(u32),
+    /// It is lost: the side is black.
+    Black,
+    /// It passes: the side is not there, or another facet stands for it.
+    Open,
+}
+
 /// A polygon as the hemicube sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facet<'a> {
@@ -24,10 +35,10 @@ pub struct Facet<'a> {
     pub vertices: &'a [DVec3],
     /// Its normal, of any length.
     pub normal: DVec3,
-    /// Where light that reaches its front is counted; `None` occludes as black.
-    pub front: Option<u32>,
-    /// The same for its back; `None` for one-sided polygons.
-    pub back: Option<u32>,
+    /// Its front.
+    pub front: FacetSide,
+    /// Its back; [`FacetSide::Black`] for one-sided polygons.
+    pub back: FacetSide,
 }
 
 /// A hemicube of a resolution, with its buffers.
@@ -115,12 +126,16 @@ impl Hemicube {
             return;
         }
         // Seen from the front, the triple product of a polygon's vertices is negative.
-        let (item, sign) = if height < 0.0 {
+        let (side, sign) = if height < 0.0 {
             (facet.front, -1.0)
         } else {
             (facet.back, 1.0)
         };
-        let item = item.map_or(0, |id| id + 1);
+        let item = match side {
+            FacetSide::Counted(id) => id + 1,
+            FacetSide::Black => 0,
+            FacetSide::Open => return,
+        };
         let view = |v: DVec3| {
             let r = v - origin;
             DVec3::new(r.dot(face.right), r.dot(face.up), r.dot(face.forward))
@@ -296,8 +311,8 @@ mod tests {
         Facet {
             vertices,
             normal: (vertices[1] - vertices[0]).cross(vertices[2] - vertices[0]),
-            front: Some(id),
-            back: None,
+            front: FacetSide::Counted(id),
+            back: FacetSide::Black,
         }
     }
 
@@ -338,7 +353,7 @@ mod tests {
         // Each pixel is taken by one triangle: with ids of their own they still sum to one, and a
         // reversed order changes nothing.
         for (k, f) in facets.iter_mut().enumerate() {
-            f.front = Some(k as u32);
+            f.front = FacetSide::Counted(k as u32);
         }
         let forwards = factors(64, &facets, 12);
         facets.reverse();
@@ -395,7 +410,7 @@ mod tests {
             "a back is black and occludes: {f:?}"
         );
         let two_sided = Facet {
-            back: Some(0),
+            back: FacetSide::Counted(0),
             ..facet(&reversed, 1)
         };
         assert!(
