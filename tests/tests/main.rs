@@ -1,6 +1,8 @@
 //! The integration tests of luxel, one module per subject.
 
 mod ambient_occlusion;
+mod bad_input;
+mod determinism;
 mod enclosures;
 mod form_factors;
 mod hemicube;
