@@ -44,6 +44,12 @@ impl PatchLight {
         }
     }
 
+    /// The largest radiosity of all patches and channels in W/m².
+    pub fn brightest(&self) -> f64 {
+        let largest = self.radiosity.iter().map(|b| b.0.max_element());
+        largest.fold(0.0, f64::max)
+    }
+
     /// Area-weighted means by object, in the order of the scene's objects; objects without faces
     /// are left out. A patch that spans faces of several objects counts for each by their area.
     pub fn by_object(&self, world: &World<'_>, patches: &Patches) -> Vec<ObjectLight> {

@@ -86,6 +86,7 @@ exits_with! {
     crate::image::png::EncodePngError => Failure,
     luxel_solver::patches::MeshError => InvalidInput,
     luxel_solver::solvers::SystemError => InvalidInput,
+    luxel_solver::solvers::DirectError => Failure,
     crate::ply::TooManyCorners => Failure,
     csv::Error => Failure,
     std::io::Error => Failure,

@@ -5,6 +5,7 @@
 
 mod check;
 mod common;
+mod dense;
 mod diff;
 mod exit;
 mod form_factors;

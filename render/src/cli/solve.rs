@@ -1,11 +1,13 @@
 //! `luxel solve`: radiosity by object, convergence, and where the light goes.
 
+use super::dense::{self, DenseSolution, Factors, Solver};
 use super::exit::{ExitCode, Failure};
 use super::scene;
 use super::transport::{Purpose, Transport};
 use super::{Context, Session};
 use crate::files::Output;
 use crate::solution::{ObjectLight, PatchLight, emitted_flux};
+use clap::ValueEnum;
 use luxel_scenes::{Irradiance, Radiosity, Rgb};
 use luxel_solver::patches::PatchSize;
 use luxel_solver::radiosity::RadiositySolution;
@@ -21,6 +23,9 @@ const REPLICATES: u32 = 4;
 /// Patches of a mesh whose size is not given.
 const PATCHES: usize = 4000;
 
+/// Patches of such a mesh when every pair has a form factor.
+const DENSE_PATCHES: usize = 1000;
+
 /// Solve for the radiosity of a scene
 ///
 /// Prints area-weighted means by object (W/m², or lm/m² in a photometric scene), the energy ledger
@@ -34,9 +39,19 @@ pub(super) struct Solve {
     #[arg(long, value_name = "S|whole", value_parser = parse_patch_size)]
     patch_size: Option<PatchSize>,
 
-    /// Rays of each patch
-    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
-    rays: u32,
+    /// Form factors of every pair of patches [default: sparse rows of rays with direct light apart,
+    /// the fastest]
+    #[arg(long, value_enum, value_name = "HOW")]
+    form_factors: Option<Method>,
+
+    /// With --form-factors: what solves the system [default: gauss-seidel]
+    #[arg(long, value_enum, value_name = "NAME", requires = "form_factors")]
+    solver: Option<Solver>,
+
+    /// Rays of each patch [default: 256; raycast: 65536]; analytic: visibility rays of each pair of
+    /// polygons [default: 64]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
+    rays: Option<u32>,
 
     /// Bound on the error that the iteration may leave, relative to the brightest patch
     #[arg(long, value_name = "T", default_value_t = 1e-7, value_parser = parse_tolerance)]
@@ -45,6 +60,15 @@ pub(super) struct Solve {
     /// Mesh with vertex colours to write
     #[arg(short, long, value_name = "OUT.ply")]
     output: Option<PathBuf>,
+}
+
+/// How form factors of every pair of patches are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Method {
+    /// Exact, times a visibility that rays sample where something stands between
+    Analytic,
+    /// The fraction of rays that arrive
+    Raycast,
 }
 
 /// What is reported.
@@ -86,7 +110,10 @@ impl Solve {
         let mut report = context.common.install(|| {
             let world = World::new(&scene);
             scene::require_light(&world)?;
-            self.solve(&world, context)
+            match self.form_factors {
+                None => self.solve_rows(&world, context),
+                Some(method) => self.solve_dense(&world, method, context),
+            }
         })??;
         report.seconds.insert(0, ("load", loaded));
         let total = started.elapsed().as_secs_f64();
@@ -117,11 +144,12 @@ impl Solve {
         Ok(ExitCode::Ok)
     }
 
-    fn solve(&self, world: &World<'_>, context: &Context<'_>) -> Result<Report, Failure> {
+    /// Sparse rows in two classes, direct light apart.
+    fn solve_rows(&self, world: &World<'_>, context: &Context<'_>) -> Result<Report, Failure> {
         let started = Instant::now();
         let purpose = Purpose::Solve {
             size: self.patch_size.unwrap_or(PatchSize::Count(PATCHES)),
-            rays: self.rays as usize,
+            rays: self.rays.unwrap_or(256) as usize,
             tolerance: self.tolerance,
             replicates: REPLICATES,
         };
@@ -147,11 +175,6 @@ impl Solve {
         let largest = |value: fn(&RadiositySolution) -> Rgb| {
             solutions.iter().map(value).fold(Rgb::ZERO, Rgb::max)
         };
-        let brightest = light
-            .radiosity
-            .iter()
-            .map(|b| b.0.max_element())
-            .fold(0.0, f64::max);
         let mesh = self.output.as_ref().map(|_| light.mesh(world, &patches));
         Ok(Report {
             patches: patches.len(),
@@ -164,11 +187,75 @@ impl Solve {
                 (world.scene().lights.is_empty()).then(|| emitted_flux(world, &patches).0),
             ),
             error: Error {
-                solver: largest(|solution| solution.error_bound).max_element() / brightest,
+                solver: largest(|solution| solution.error_bound).max_element() / light.brightest(),
                 sampling: sampling_error(&each),
             },
             converged: solutions.iter().all(|s| s.outcome == Outcome::Converged),
             seconds: vec![("solve", solved)],
+        })
+    }
+}
+
+impl Solve {
+    /// A dense matrix of form factors.
+    fn solve_dense(
+        &self,
+        world: &World<'_>,
+        method: Method,
+        context: &Context<'_>,
+    ) -> Result<Report, Failure> {
+        let started = Instant::now();
+        let rays = |default: usize| self.rays.map_or(default, |rays| rays as usize);
+        let factors = match method {
+            Method::Analytic => Factors::Analytic(rays(64)),
+            Method::Raycast => Factors::RayCast(rays(65_536)),
+        };
+        let size = self.patch_size.unwrap_or(PatchSize::Count(DENSE_PATCHES));
+        let patches = world.mesh(size)?;
+        let solver = self.solver.unwrap_or(Solver::GaussSeidel);
+        let config = dense::config(self.tolerance);
+        let solved = dense::solve(world, &patches, factors, solver, &config, context)?;
+        let seconds = started.elapsed().as_secs_f64();
+
+        let DenseSolution {
+            solution,
+            ledger,
+            standard_error,
+        } = solved;
+        let light = PatchLight::new(&patches, solution.irradiance);
+        let mesh = self.output.as_ref().map(|_| light.mesh(world, &patches));
+        let squares: f64 = patches
+            .areas()
+            .iter()
+            .zip(&standard_error)
+            .map(|(area, error)| area * error.0.length_squared() / 3.0)
+            .sum();
+        let level: f64 = patches
+            .areas()
+            .iter()
+            .zip(&light.irradiance)
+            .map(|(area, irradiance)| area * irradiance.0.element_sum() / 3.0)
+            .sum();
+        let area: f64 = patches.areas().iter().sum();
+        let sampling = (squares / area).sqrt() / (level / area);
+        Ok(Report {
+            patches: patches.len(),
+            objects: light.by_object(world, &patches),
+            mesh: mesh.map(|mesh| mesh.to_ply()).transpose()?,
+            iterations: solution.iterations,
+            residual: solution.residual,
+            energy: Energy {
+                emitted: ledger.emitted.0,
+                absorbed: ledger.absorbed.0,
+                escaped: ledger.escaped.0,
+                residual: ledger.residual.0 + ledger.defect.0,
+            },
+            error: Error {
+                solver: solution.error_bound.max_element() / light.brightest(),
+                sampling: if level > 0.0 { sampling } else { 0.0 },
+            },
+            converged: solution.outcome == Outcome::Converged,
+            seconds: vec![("solve", seconds)],
         })
     }
 }

@@ -104,6 +104,7 @@ fn usage_errors_exit_with_2_and_leave_stdout_empty() {
         &["probe", &scene, "--points", "p.csv", "--max-distance", "1"],
         &["solve", &scene, "--patch-size", "-1"],
         &["solve", &scene, "--tolerance", "nan"],
+        &["solve", &scene, "--solver", "jacobi"],
         &["form-factors", &scene, "-o", "f.txt"],
     ] {
         let (exit, stdout, stderr) = luxel(args);
@@ -396,6 +397,41 @@ fn form_factors_of_a_cube_are_exact_closed_and_written() {
         error > 0.0 && difference.abs() < 4.0 * error,
         "{difference} +- {error}"
     );
+}
+
+#[test]
+fn every_estimator_and_solver_agrees_on_the_furnace() {
+    let two_pi = 2.0 * std::f64::consts::PI;
+    for (method, solver) in [
+        ("analytic", "jacobi"),
+        ("analytic", "gauss-seidel"),
+        ("analytic", "direct"),
+        ("raycast", "gauss-seidel"),
+    ] {
+        let (exit, stdout, stderr) = luxel(&[
+            "solve",
+            &example("furnace"),
+            "--json",
+            "--patch-size",
+            "whole",
+            "--form-factors",
+            method,
+            "--solver",
+            solver,
+            "--rays",
+            "64",
+        ]);
+        assert_eq!(exit, ExitCode::Ok, "{stderr}");
+        let result = json(&stdout);
+        // Every row of either matrix sums to one, so that B = 2π up to the tolerance of 1e-7 and
+        // the closure of the rows.
+        let value = result["objects"]["floor"]["radiosity"][0].as_f64();
+        let value = value.expect("a number");
+        assert!(
+            (value / two_pi - 1.0).abs() < 1e-7,
+            "{method} {solver}: {value}"
+        );
+    }
 }
 
 #[test]

@@ -1,8 +1,8 @@
-//! Form factors between the objects of a scene, front to front.
+//! Form factors between the objects of a scene, or between patches, front to front.
 //!
-//! F_AB = (1/A_A) Σ_{p∈A} Σ_{q∈B} A_p F_pq over the faces p, q. Two estimators:
+//! F_AB = (1/A_A) Σ_{p∈A} Σ_{q∈B} A_p F_pq over the polygons p, q. Two estimators:
 //!
-//! - [`analytic_between_objects`]: A_p F_pq is the exact exchange area S_pq of the unoccluded pair times
+//! - [`analytic_between_objects`], [`analytic_between_patches`]: A_p F_pq is the exact exchange area S_pq of the unoccluded pair times
 //!   a visibility V = Σ w v / Σ w over segments between points spread evenly over p and q, with
 //!   the kernel w = cos θ_p cos θ_q / r². Where nothing stands between, every v is 1 and the
 //!   result is exact; otherwise its error is that of V, which is a ratio and hence biased by
@@ -15,10 +15,10 @@
 
 use super::polygon::Polygon;
 use super::polygon_to_polygon::exchange_area;
-use super::ray_cast::{REPLICATES, RayCastConfig};
+use super::ray_cast::{REPLICATES, RayCastConfig, RayCastFactors};
 use crate::bvh::{Hit, Ray};
 use crate::geometry::{offset_bound, ray_origin};
-use crate::patches::Side;
+use crate::patches::{Patches, Side};
 use crate::sampling::{self, Discrete, Frame, Sequence, Stage, cosine_hemisphere};
 use crate::world::World;
 use glam::DVec3;
@@ -48,12 +48,13 @@ pub struct ObjectFactors {
     pub standard_error: Vec<f64>,
 }
 
-/// A face as an emitter and receiver.
+/// A polygon as an emitter and receiver.
 struct Facet {
-    /// Position in [`ObjectFactors::objects`].
-    object: usize,
-    face: FaceId,
-    /// In the unit frame, like the two below.
+    /// The object or patch that it belongs to.
+    group: usize,
+    /// The faces that it is a part of, which hide nothing of it.
+    faces: Vec<FaceId>,
+    /// In the unit frame, like all below.
     exact: Polygon,
     points: sampling::Polygon,
     extent: f64,
@@ -64,6 +65,28 @@ struct Facet {
 }
 
 impl Facet {
+    /// A facet from its corners in the unit frame; `None` where it has no area and hence exchanges
+    /// nothing.
+    fn new(group: usize, faces: Vec<FaceId>, corners: &[DVec3]) -> Option<Self> {
+        let exact = Polygon::new(corners).ok()?;
+        let points = sampling::Polygon::new(corners)?;
+        let middle = corners.iter().sum::<DVec3>() / corners.len() as f64;
+        let bounds = corners
+            .iter()
+            .fold((middle, middle), |(lo, hi), &c| (lo.min(c), hi.max(c)));
+        let extent = (bounds.1 - bounds.0).max_element();
+        let width = exact.area() / extent;
+        Some(Self {
+            group,
+            faces,
+            inset: (8.0 * offset_bound(middle, extent) / width).min(MAX_INSET),
+            exact,
+            points,
+            extent,
+            middle,
+        })
+    }
+
     /// A point for `u` in the unit square, even over the facet but for a margin along its edges of
     /// a few times the rounding of ray origins: a point on an edge could be rounded to behind the
     /// face that adjoins there, which would then seem to block it.
@@ -92,30 +115,14 @@ impl Facets {
                 objects.push(ObjectId::new(index));
             }
         }
+        let facet = |face: FaceId| {
+            let group = place[scene.faces[face.index()].object.index()];
+            Facet::new(group, vec![face], &geometry.polygon(face))
+        };
+        let all: Vec<Facet> = scene.face_ids().filter_map(facet).collect();
         let mut areas = vec![0.0; objects.len()];
-        let mut all = Vec::with_capacity(scene.faces.len());
-        for face in scene.face_ids() {
-            let corners = geometry.polygon(face);
-            let object = place[scene.faces[face.index()].object.index()];
-            // Faces without area exchange nothing.
-            let (Ok(exact), Some(points)) =
-                (Polygon::new(&corners), sampling::Polygon::new(&corners))
-            else {
-                continue;
-            };
-            areas[object] += exact.area();
-            let middle = corners.iter().sum::<DVec3>() / corners.len() as f64;
-            let extent = geometry.extent(face);
-            let width = exact.area() / extent;
-            all.push(Facet {
-                object,
-                face,
-                exact,
-                points,
-                extent,
-                middle,
-                inset: (8.0 * offset_bound(middle, extent) / width).min(MAX_INSET),
-            });
+        for facet in &all {
+            areas[facet.group] += facet.exact.area();
         }
         Self {
             all,
@@ -143,47 +150,90 @@ impl Facets {
 /// up to a multiple of [`REPLICATES`].
 pub fn analytic_between_objects(world: &World, config: &RayCastConfig) -> ObjectFactors {
     let facets = Facets::new(world);
-    let all = &facets.all;
-    // Exchange areas of each pair of faces, by the object of the second one.
-    let rows: Vec<Vec<(usize, f64, f64)>> = (0..all.len())
+    let (factors, standard_error) = exchange(world, &facets.all, &facets.areas, config);
+    facets.finish(world, factors, standard_error)
+}
+
+/// Exact exchange times sampled visibility between all patches, each side of a two-sided face a
+/// patch of its own; `config.rays` segments for each pair of polygons, rounded up to a multiple of
+/// [`REPLICATES`].
+pub fn analytic_between_patches(
+    world: &World,
+    patches: &Patches,
+    config: &RayCastConfig,
+) -> RayCastFactors {
+    let geometry = world.surfaces().geometry();
+    let mut all = Vec::with_capacity(patches.len());
+    let mut areas = vec![0.0; patches.len()];
+    for patch in patches.ids() {
+        let (faces, _) = patches.faces(patch);
+        for corners in patches.polygons(geometry, patch) {
+            // The faces of a cluster do hide each other; which of them this is, is not known.
+            let own = if faces.len() <= 2 {
+                faces.to_vec()
+            } else {
+                Vec::new()
+            };
+            if let Some(facet) = Facet::new(patch.index(), own, &corners) {
+                areas[patch.index()] += facet.exact.area();
+                all.push(facet);
+            }
+        }
+    }
+    let (factors, standard_error) = exchange(world, &all, &areas, config);
+    RayCastFactors {
+        len: patches.len(),
+        factors,
+        standard_error,
+    }
+}
+
+/// Factors and their standard errors between the groups of `facets`; `areas` of the groups in
+/// square units.
+fn exchange(
+    world: &World,
+    facets: &[Facet],
+    areas: &[f64],
+    config: &RayCastConfig,
+) -> (Vec<f64>, Vec<f64>) {
+    // Exchange areas of each pair, by the group of the second one.
+    let rows: Vec<Vec<(usize, f64, f64)>> = (0..facets.len())
         .into_par_iter()
         .with_max_len(1)
         .map(|p| {
-            let pairs = (p + 1..all.len()).filter_map(|q| {
-                let exchange = exchange_area(&all[p].exact, &all[q].exact, ACCURACY);
-                (exchange > 0.0).then(|| {
+            let pairs = (p + 1..facets.len()).filter_map(|q| {
+                let area = exchange_area(&facets[p].exact, &facets[q].exact, ACCURACY);
+                (area > 0.0).then(|| {
                     let item = (p as u64) << 32 | q as u64;
-                    let (visible, error) = visibility(world, [&all[p], &all[q]], item, config);
-                    (all[q].object, exchange * visible, exchange * error)
+                    let (visible, error) =
+                        visibility(world, [&facets[p], &facets[q]], item, config);
+                    (facets[q].group, area * visible, area * error)
                 })
             });
             pairs.collect()
         })
         .collect();
 
-    let n = facets.objects.len();
-    let mut exchange = vec![0.0; n * n];
+    let n = areas.len();
+    let mut factors = vec![0.0; n * n];
     let mut variance = vec![0.0; n * n];
-    for (facet, row) in all.iter().zip(rows) {
-        let a = facet.object;
+    for (facet, row) in facets.iter().zip(rows) {
+        let a = facet.group;
         for (b, area, error) in row {
-            // Both ways; a pair within one object adds to the same entry twice.
+            // Both ways; a pair within one group adds the same number to one entry twice.
             for at in [a * n + b, b * n + a] {
-                exchange[at] += area;
-            }
-            for at in [a * n + b, b * n + a] {
-                // The two halves of a pair within one object are the same number.
+                factors[at] += area;
                 variance[at] += error * error * if a == b { 2.0 } else { 1.0 };
             }
         }
     }
-    for a in 0..n {
-        for b in 0..n {
-            exchange[a * n + b] /= facets.areas[a];
-            variance[a * n + b] = variance[a * n + b].sqrt() / facets.areas[a];
-        }
+    for (at, (factor, variance)) in factors.iter_mut().zip(&mut variance).enumerate() {
+        // A group without area has no factors.
+        let scale = 1.0 / areas[at / n].max(f64::MIN_POSITIVE);
+        *factor *= scale;
+        *variance = variance.sqrt() * scale;
     }
-    facets.finish(world, exchange, variance)
+    (factors, variance)
 }
 
 /// The visible share of the exchange between two facets, and its standard error.
@@ -215,7 +265,8 @@ fn visibility(world: &World, [p, q]: [&Facet; 2], item: u64, config: &RayCastCon
     // The two faces themselves are planar and face each other: they hide nothing.
     let is_open = |hit: &Hit| {
         hit.triangle()
-            .is_none_or(|triangle| [p.face, q.face].contains(&geometry.face(triangle)))
+            .map(|triangle| geometry.face(triangle))
+            .is_none_or(|face| p.faces.contains(&face) || q.faces.contains(&face))
     };
     if hits.iter().all(is_open) {
         return (1.0, 0.0);
@@ -266,7 +317,7 @@ pub fn ray_cast_between_objects(world: &World, config: &RayCastConfig) -> Object
     let own: Vec<Vec<&Facet>> = (0..n)
         .map(|object| {
             let facets = facets.all.iter();
-            facets.filter(|facet| facet.object == object).collect()
+            facets.filter(|facet| facet.group == object).collect()
         })
         .collect();
     let fractions: Vec<Vec<f64>> = tasks
