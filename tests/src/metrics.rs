@@ -3,7 +3,7 @@
 //! Equations, over all points and channels, d = x − x*, v* the variance of the reference:
 //! nRMSE = √max(0, mean(d² − v*)) / mean(x*);
 //! relRMSE = √max(0, mean((d² − v*)/(x*² + (0.01 mean x*)²))); bias = mean(d)/mean(x*).
-//! E[d²] is the squared error plus v*, so that subtracting v* leaves an unbiased estimate of
+//! The mean of d² is the squared error plus v*, so that subtracting v* leaves an unbiased estimate of
 //! the mean squared error.
 //!
 //! Source: luxel's definition of error, that of the command's reports. Validity: reference errors

@@ -2,8 +2,8 @@
 //!
 //! L(x, ω) = L_e + Σ over paths, by Monte Carlo: at every diffuse vertex one connection to a light
 //! (the next event) and one direction by the cosine; mirrors and glass continue in their own
-//! direction, chosen by chance with their share of the energy. From the [`ROULETTE_FROM`]-th bounce
-//! a path survives with a probability q ≤ [`MAX_SURVIVAL`] and is weighted by 1/q. Emission that
+//! direction, chosen by chance with their share of the energy. From the `ROULETTE_FROM`-th bounce
+//! a path survives with a probability q ≤ `MAX_SURVIVAL` and is weighted by 1/q. Emission that
 //! the connections cover (the polygons of [`luxel_solver::direct::Lights`]) counts on a hit only
 //! where no connection could be made: from the camera and after a mirror or glass; every other
 //! emission and the sky are found by the paths themselves. The backs of one-sided faces are black.

@@ -1,7 +1,7 @@
 //! The radiosity solution itself, as a picture.
 //!
 //! L = L_e + ρE/π, where E is the irradiance of the patches, interpolated over smooth surfaces but
-//! not across creases ([`super::smooth`]); emission and reflectance are those of the very point, so
+//! not across creases (`super::smooth`); emission and reflectance are those of the very point, so
 //! that textures stay sharp. Biased by the size of the patches: shadows are as soft as patches are
 //! large. Cost: one ray a camera sample.
 

@@ -4,7 +4,7 @@
 //! - E comes from a [`Gatherer`] (direct and indirect), or, without one, is the direct light plus a
 //!   constant ambient irradiance;
 //! - a mirror has k_r = its reflectance, glass k_r = F and k_t = (1 − F) τ/η² with Fresnel's exact F
-//!   ([`super::specular`]);
+//!   (`super::specular`);
 //! - glossy surfaces add, for every point, spot and directional light that is not blocked,
 //!   (k_s/π) (cos α)^n E⊥ with E⊥ = I/d² the irradiance facing the light; α lies between the mirrored
 //!   light and the viewer (Phong), or between the normal and the half vector (Blinn).
@@ -15,7 +15,7 @@
 //! computer generated pictures", CACM 18(6), 1975; J. F. Blinn, "Models of light reflection for
 //! computer synthesized pictures", SIGGRAPH 1977. Validity: light that reaches a diffuse surface
 //! through mirrors or glass (caustics) is missing. Rays deeper than `Config::depth`, or whose
-//! weight is below [`MIN_WEIGHT`], carry nothing. Rays of one depth are cast as one batch.
+//! weight is below `MIN_WEIGHT`, carry nothing. Rays of one depth are cast as one batch.
 
 use super::gather::Gatherer;
 use super::specular::{boundary, reflect};

@@ -4,7 +4,7 @@
 //! E = E^direct + (1/M) Σ_m B(hit_m) over M cosine-distributed rays, where B = ρ(hit) E(patch) is
 //! looked up at the hit. A hit that is nearer than the size of its patch is not looked up, because
 //! the patch says nothing about variation below its size: the path goes on from there
-//! ([`near_chain`]).
+//! (`near_chain`).
 //!
 //! The budget is split evenly over independent randomisations ("replicates"), each with a radiosity
 //! solution and gather rays of its own; their mean is the result and their scatter its standard

@@ -1,6 +1,6 @@
 //! Radiosity of a scene from ray-cast rows: the coarse solution that a final gather looks up.
 //!
-//! Each patch carries two unknowns, the *far* and the *near* class (see [`rows`]). Direct light is
+//! Each patch carries two unknowns, the *far* and the *near* class (see `rows`). Direct light is
 //! computed apart at the sample points of the patches, so that the system carries reflected light
 //! only: B = ρ (E^direct + F B).
 
