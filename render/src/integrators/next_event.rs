@@ -62,12 +62,12 @@ pub(super) fn connect(
     let source = &sources[index];
     let (ray, towards, irradiance) = match source {
         Source::Polygon {
-            corners,
+            shape,
             normal,
             extent,
             radiance,
         } => {
-            let (point, direction, pdf) = sample_polygon(receiver, corners, position)?;
+            let (point, direction, pdf) = sample_polygon(receiver, shape.corners(), position)?;
             let cosine = direction.dot(receiver.normal);
             // Points of a polygon behind its own plane send nothing: the exact E_i is zero there,
             // so that such a source is never chosen.

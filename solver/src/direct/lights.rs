@@ -6,6 +6,7 @@ use crate::surface::Surfaces;
 use glam::DVec3;
 use luxel_scenes::{FaceId, LightKind, Radiance, Rgb, Sidedness};
 
+use super::kernel::Luminaire;
 use super::merge::merge;
 use super::sky::SkyDome;
 
@@ -19,8 +20,8 @@ const MAX_POLYGONS: usize = 512;
 pub enum Source {
     /// An emissive planar convex polygon, counter-clockwise seen from where it shines.
     Polygon {
-        /// Corners in the unit frame.
-        corners: Vec<DVec3>,
+        /// Its shape in the unit frame.
+        shape: Luminaire,
         /// Unit normal of the side that shines.
         normal: DVec3,
         /// Longest side of the box around it, in units.
@@ -54,8 +55,8 @@ impl Source {
     pub fn irradiance(&self, position: DVec3, normal: DVec3) -> Rgb {
         match self {
             Self::Polygon {
-                corners, radiance, ..
-            } => radiance.to_irradiance().0 * point_to_polygon(position, normal, corners),
+                shape, radiance, ..
+            } => radiance.to_irradiance().0 * point_to_polygon(position, normal, shape.corners()),
             Self::Point {
                 position: source,
                 intensity,
@@ -121,16 +122,16 @@ impl Lights {
                 ..
             } = polygon;
             if polygon.two_sided {
-                let corners = corners.iter().rev().copied().collect();
+                let reversed = corners.iter().rev().copied().collect();
                 sources.push(Source::Polygon {
-                    corners,
+                    shape: Luminaire::new(reversed),
                     normal: -normal,
                     extent,
                     radiance,
                 });
             }
             sources.push(Source::Polygon {
-                corners,
+                shape: Luminaire::new(corners),
                 normal,
                 extent,
                 radiance,

@@ -10,5 +10,6 @@ mod merge;
 mod sampler;
 mod sky;
 
+pub use kernel::Luminaire;
 pub use lights::{Lights, Source};
 pub use sampler::{DirectSampler, Sample, ShadowRays};

@@ -225,26 +225,26 @@ impl<'a> DirectSampler<'a> {
         let mut weight = 1.0;
         let target = match &self.lights.sources()[source as usize] {
             Source::Polygon {
-                corners,
+                shape,
                 normal,
                 extent,
                 ..
             } => {
-                let plane = Plane {
-                    point: sample.position,
-                    normal: sample.normal,
-                };
-                clip(corners, &plane, &mut self.clipped);
                 let sequence = sample.sequence.dimension_set(source);
                 let point = if count < MANY_RAYS {
-                    kernel::sample(
+                    shape.sample(
                         sample.position,
                         sample.normal,
-                        &self.clipped,
                         sequence,
                         index,
+                        &mut self.clipped,
                     )
                 } else {
+                    let plane = Plane {
+                        point: sample.position,
+                        normal: sample.normal,
+                    };
+                    clip(shape.corners(), &plane, &mut self.clipped);
                     let u = sequence.point2(index);
                     kernel::warped(sample.position, sample.normal, &self.clipped, u).map(
                         |(point, kernel)| {
@@ -254,7 +254,7 @@ impl<'a> DirectSampler<'a> {
                     )
                 };
                 // Without solid angle in f64 there is no irradiance beyond rounding either.
-                ray_origin(point.unwrap_or(corners[0]), *normal, *extent)
+                ray_origin(point.unwrap_or(shape.corners()[0]), *normal, *extent)
             }
             Source::Point { position, .. } => position.as_vec3(),
             Source::Directional { towards, .. } => {
