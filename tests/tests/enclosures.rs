@@ -2,7 +2,9 @@
 
 use glam::DVec3;
 use luxel_scenes::{Exitance, Irradiance, Radiosity, Reflectance, Rgb};
-use luxel_solver::form_factors::{Polygon, closure, unoccluded_matrix};
+use luxel_solver::form_factors::{
+    AnalyticConfig, AnalyticFactors, Polygon, analytic, closure, unoccluded_matrix,
+};
 use luxel_solver::solvers::{
     Config, Ledger, Outcome, Solution, System, SystemError, Tolerance, direct, gauss_seidel,
     jacobi, no_progress, source,
@@ -322,6 +324,57 @@ fn a_furnace_has_one_radiosity_everywhere() {
         checked += 1;
     }
     assert!(checked >= 3, "the file holds furnaces: {checked}");
+}
+
+#[test]
+fn a_furnace_with_a_box_in_it_has_one_radiosity_everywhere() {
+    let mut checked = 0;
+    for room in rooms().into_iter().filter(|r| r.geometry.faces.len() > 6) {
+        let (Some(exact), Some(rho), Emission::Faces(emission)) = (
+            &room.reference.everywhere,
+            room.reflectance.colours(),
+            &room.emission,
+        ) else {
+            continue;
+        };
+        if room.geometry.faces.iter().any(|f| !is_convex(&points(f))) {
+            continue;
+        }
+        let exact = number(exact);
+        let faces = whole_faces(&room);
+        let patches: Vec<_> = faces.iter().cloned().map(|f| vec![f]).collect();
+        let config = AnalyticConfig {
+            accuracy: 1e-11,
+            points: 4096,
+            seed: 0,
+        };
+        let AnalyticFactors { matrix, .. } = analytic(&patches, &faces, &config);
+        let reflectance: Vec<_> = rho.into_iter().map(Reflectance).collect();
+        let emission = emission.colours().expect("faces emit");
+        let source: Vec<_> = emission.into_iter().map(Radiosity).collect();
+        let system = System::new(&matrix, &reflectance, &source).expect("a valid system");
+        let defect = closure(&matrix).largest_defect;
+        // Eight lattices of 610 points each see the shadows of a box: O(1/M²) of each entry.
+        assert!(defect < 1e-4, "{}: closure {defect:e}", room.id);
+        let gain = system.gain().max_element();
+        for b in &direct(&system).expect("a regular matrix").radiosity {
+            let e = (b.0.x / exact - 1.0).abs();
+            let tolerance = defect * gain / (1.0 - gain) + 1e-12;
+            assert!(e <= tolerance, "{}: {b:?}, {e:e}", room.id);
+        }
+        checked += 1;
+    }
+    assert!(checked >= 1, "the file holds rooms with boxes");
+}
+
+/// True when all corners turn the same way.
+fn is_convex(polygon: &[DVec3]) -> bool {
+    let n = polygon.len();
+    let turn = |k: usize| {
+        let [a, b, c] = [polygon[k], polygon[(k + 1) % n], polygon[(k + 2) % n]];
+        (b - a).cross(c - b)
+    };
+    (0..n).all(|k| turn(k).dot(turn(0)) >= 0.0)
 }
 
 fn cube() -> Vec<Polygon> {
