@@ -70,10 +70,22 @@ pub fn occluded_exchange_area(
     if whole == 0.0 {
         return unoccluded;
     }
-    let between = candidates(p, q, occluders);
+    let between = candidates(p, q, occluders, 0.0);
     if between.is_empty() {
         return unoccluded;
     }
+    let between: Vec<&Polygon> = between.into_iter().map(|k| &occluders[k]).collect();
+    exchange_past(p, q, &between, config, item)
+}
+
+/// S past occluders all of which may hide something.
+pub(super) fn exchange_past(
+    p: &Polygon,
+    q: &Polygon,
+    occluders: &[&Polygon],
+    config: &AnalyticConfig,
+    item: u64,
+) -> Exchange {
     let (one, other) = if p.area() <= q.area() { (p, q) } else { (q, p) };
     let per_shift = config.points.div_ceil(SHIFTS);
     let (mut sum, mut squares) = (0.0, 0.0);
@@ -83,7 +95,7 @@ pub fn occluded_exchange_area(
         let mean: f64 = lattice(one, per_shift, [random(0), random(1)])
             .into_iter()
             .map(|(x, share)| {
-                let occluders = between.iter().map(|&k| &occluders[k]);
+                let occluders = occluders.iter().copied();
                 share * point_to_visible(x, one.normal(), other, occluders)
             })
             .sum();
@@ -94,7 +106,7 @@ pub fn occluded_exchange_area(
     let mean = sum / n;
     let variance = (squares / n - mean * mean).max(0.0) / (n - 1.0);
     Exchange {
-        area: (mean * one.area()).clamp(0.0, whole),
+        area: mean * one.area(),
         standard_error: variance.sqrt() * one.area(),
     }
 }

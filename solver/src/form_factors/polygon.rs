@@ -26,6 +26,7 @@ pub struct Polygon {
     area: f64,
     centre: DVec3,
     radius: f64,
+    bounds: [DVec3; 2],
 }
 
 impl Polygon {
@@ -72,12 +73,17 @@ impl Polygon {
             .iter()
             .map(|v| v.distance(centre))
             .fold(0.0, f64::max);
+        let bounds = [
+            vertices.iter().copied().fold(first, DVec3::min),
+            vertices.iter().copied().fold(first, DVec3::max),
+        ];
         Some(Self {
             vertices,
             normal,
             area,
             centre,
             radius,
+            bounds,
         })
     }
 
@@ -104,6 +110,11 @@ impl Polygon {
     /// Radius in metres of the sphere around the centre that holds the polygon.
     pub fn radius(&self) -> f64 {
         self.radius
+    }
+
+    /// Lower and upper corner of its bounding box in metres.
+    pub(super) fn bounds(&self) -> [DVec3; 2] {
+        self.bounds
     }
 
     /// The plane it lies in, facing where it faces.
@@ -163,6 +174,7 @@ impl Polygon {
             area: self.area * scale * scale,
             centre: (self.centre - origin) * scale,
             radius: self.radius * scale,
+            bounds: self.bounds.map(|v| (v - origin) * scale),
         }
     }
 

@@ -15,15 +15,23 @@ use super::clip::Plane;
 use super::polygon::Polygon;
 use glam::DVec3;
 
-/// The indices of the polygons that may stand between two others.
-pub(super) fn candidates(p: &Polygon, q: &Polygon, occluders: &[Polygon]) -> Vec<usize> {
+/// The indices of the polygons that may stand between two others. Those that reach less than `margin`
+/// (in metres) into the shaft touch it: coordinates that were rounded ask for more than zero.
+pub(super) fn candidates(
+    p: &Polygon,
+    q: &Polygon,
+    occluders: &[Polygon],
+    margin: f64,
+) -> Vec<usize> {
     let planes = [p.plane(), q.plane()];
-    let (low, high) = bounds(p.vertices().iter().chain(q.vertices()));
+    let ([p_low, p_high], [q_low, q_high]) = (p.bounds(), q.bounds());
+    let (low, high) = (p_low.min(q_low) + margin, p_high.max(q_high) - margin);
+    let is_behind = |vertices: &[DVec3], plane: &Plane| is_behind(vertices, plane, margin);
     let mut sides: Option<Vec<Plane>> = None;
     let mut found = Vec::new();
     for (index, occluder) in occluders.iter().enumerate() {
         let vertices = occluder.vertices();
-        let (o_low, o_high) = bounds(vertices.iter());
+        let [o_low, o_high] = occluder.bounds();
         if o_low.cmpgt(high).any() || o_high.cmplt(low).any() {
             continue;
         }
@@ -41,7 +49,7 @@ pub(super) fn candidates(p: &Polygon, q: &Polygon, occluders: &[Polygon]) -> Vec
         {
             continue;
         }
-        let sides = sides.get_or_insert_with(|| supporting_planes(p, q));
+        let sides = sides.get_or_insert_with(|| supporting_planes(p, q, margin));
         if !sides.iter().any(|plane| is_behind(vertices, plane)) {
             found.push(index);
         }
@@ -49,24 +57,20 @@ pub(super) fn candidates(p: &Polygon, q: &Polygon, occluders: &[Polygon]) -> Vec
     found
 }
 
-/// True when no vertex is in front of a plane.
-fn is_behind(vertices: &[DVec3], plane: &Plane) -> bool {
-    vertices.iter().all(|&v| plane.height(v) <= 0.0)
-}
-
-fn bounds<'a>(vertices: impl Iterator<Item = &'a DVec3>) -> (DVec3, DVec3) {
-    vertices.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &v| {
-        (low.min(v), high.max(v))
-    })
+/// True when no vertex is in front of a plane with a unit normal by more than `margin`.
+fn is_behind(vertices: &[DVec3], plane: &Plane, margin: f64) -> bool {
+    vertices.iter().all(|&v| plane.height(v) <= margin)
 }
 
 /// Planes through an edge of one and a vertex of the other, with all vertices in front or on them.
-fn supporting_planes(p: &Polygon, q: &Polygon) -> Vec<Plane> {
+fn supporting_planes(p: &Polygon, q: &Polygon, margin: f64) -> Vec<Plane> {
     let mut planes = Vec::new();
     for (one, other) in [(p, q), (q, p)] {
         for (a, b) in one.edges() {
             for &v in other.vertices() {
-                let normal = (b - a).cross(v - a);
+                let Some(normal) = (b - a).cross(v - a).try_normalize() else {
+                    continue;
+                };
                 for normal in [normal, -normal] {
                     let plane = Plane { point: a, normal };
                     let mut heights = one
@@ -76,8 +80,8 @@ fn supporting_planes(p: &Polygon, q: &Polygon) -> Vec<Plane> {
                         .map(|&v| plane.height(v));
                     let mut is_proper = false;
                     let holds = heights.all(|h| {
-                        is_proper |= h > 0.0;
-                        h >= 0.0
+                        is_proper |= h > margin;
+                        h >= -margin
                     });
                     if holds && is_proper {
                         planes.push(plane);
@@ -120,7 +124,7 @@ mod tests {
             ceiling.clone(),
             square(z + x * 0.9, y * 0.1, z * 0.1),
         ];
-        let found = candidates(&floor, &ceiling, &occluders);
+        let found = candidates(&floor, &ceiling, &occluders, 0.0);
         // In the middle, half outside (2), and the wall inside (9); a wall along the side (6) only
         // touches the shaft.
         assert_eq!(found, [0, 2, 9], "of ten");
@@ -140,7 +144,7 @@ mod tests {
         ];
         for p in &walls {
             for q in &walls {
-                assert!(candidates(p, q, &walls).is_empty(), "{p:?} {q:?}");
+                assert!(candidates(p, q, &walls, 0.0).is_empty(), "{p:?} {q:?}");
             }
         }
     }
