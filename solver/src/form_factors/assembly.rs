@@ -13,14 +13,19 @@ use rayon::prelude::*;
 /// F between all polygons with nothing between them, to a relative `accuracy` of each entry.
 pub fn unoccluded_matrix(polygons: &[Polygon], accuracy: f64) -> Dense {
     let areas: Vec<f64> = polygons.iter().map(Polygon::area).collect();
-    let exchange = |i: usize, j: usize| Exchange {
-        area: exchange_area(&polygons[i], &polygons[j], accuracy),
-        standard_error: 0.0,
+    let exchange = |i: usize, j: usize| {
+        if i == j {
+            return Exchange::default();
+        }
+        Exchange {
+            area: exchange_area(&polygons[i], &polygons[j], accuracy),
+            standard_error: 0.0,
+        }
     };
     exchange_matrix(&areas, exchange).matrix
 }
 
-/// F and its standard errors from the areas A_i (m²) and the exchange areas of pairs i < j.
+/// F and its standard errors from the areas A_i (m²) and the exchange areas of pairs i ≤ j.
 pub(super) fn exchange_matrix(
     areas: &[f64],
     exchange: impl Fn(usize, usize) -> Exchange + Sync,
@@ -30,15 +35,17 @@ pub(super) fn exchange_matrix(
     let rows: Vec<Vec<Exchange>> = (0..n)
         .into_par_iter()
         .with_max_len(1)
-        .map(|i| (i + 1..n).map(|j| exchange(i, j)).collect())
+        .map(|i| (i..n).map(|j| exchange(i, j)).collect())
         .collect();
     let mut factors = vec![0.0; n * n];
     let mut errors = vec![0.0; n * n];
     for (i, row) in rows.iter().enumerate() {
-        for (j, s) in (i + 1..n).zip(row) {
+        for (j, s) in (i..n).zip(row) {
             for (from, to) in [(i, j), (j, i)] {
-                factors[from * n + to] = s.area / areas[from];
-                errors[from * n + to] = s.standard_error / areas[from];
+                // A group without area exchanges nothing.
+                let scale = 1.0 / areas[from].max(f64::MIN_POSITIVE);
+                factors[from * n + to] = s.area * scale;
+                errors[from * n + to] = s.standard_error * scale;
             }
         }
     }

@@ -2,24 +2,20 @@
 //!
 //! F_AB = (1/A_A) Σ_{p∈A} Σ_{q∈B} A_p F_pq over the polygons p, q. Two estimators:
 //!
-//! - [`analytic_between_objects`], [`analytic_between_patches`]: A_p F_pq is the exact exchange area where
-//!   nothing reaches into the shaft between p and q; past up to 48 faces it is the integral
-//!   over one polygon of the exact form factor to what is seen of the other, at N points (see
-//!   `occluded`); past more, the unoccluded area times a visibility V = Σ w v / Σ w over N segments
-//!   between points spread evenly over p and q, with the kernel w = cos θ_p cos θ_q / r², which is a
-//!   ratio and hence biased by O(1/N). Reciprocal to rounding. Cost: n²/2 pairs of polygons, a scan of
-//!   the faces for each.
+//! - [`analytic_between_objects`], [`analytic_between_patches`]: A_p F_pq is the exact exchange area S_pq of the unoccluded pair times
+//!   a visibility V = Σ w v / Σ w over segments between points spread evenly over p and q, with
+//!   the kernel w = cos θ_p cos θ_q / r². Where nothing stands between, every v is 1 and the
+//!   result is exact; otherwise its error is that of V, which is a ratio and hence biased by
+//!   O(1/N). Reciprocal to rounding. Cost: n²/2 pairs of faces with N segments each.
 //! - [`ray_cast_between_objects`]: the fraction of the cosine-distributed rays from A that meet a front
 //!   of B first. Unbiased for any geometry. Cost: N rays an object, whatever its faces.
 //!
 //! Standard errors come from [`REPLICATES`] independent randomisations. Sources: see
 //! [`super::polygon_to_polygon`] and [`super::ray_cast`].
 
-use super::occluded::{AnalyticConfig, exchange_past};
 use super::polygon::Polygon;
 use super::polygon_to_polygon::exchange_area;
 use super::ray_cast::{REPLICATES, RayCastConfig, RayCastFactors};
-use super::shaft::candidates;
 use crate::bvh::{Hit, Ray};
 use crate::geometry::{offset_bound, ray_origin};
 use crate::patches::{Patches, Side};
@@ -35,10 +31,6 @@ const ACCURACY: f64 = 1e-12;
 /// Largest relative margin along the edges of a facet that no points are drawn from. It is reached by
 /// slivers a few thousandths of the scene wide; larger would bias them visibly.
 const MAX_INSET: f64 = 1e-3;
-
-/// Faces in the shaft of a pair up to which they are subtracted exactly. Each costs about 1 µs a point,
-/// so that beyond some dozens segments are cheaper, though less exact.
-const MAX_EXACT: usize = 48;
 
 /// Rays per batch.
 const BATCH: u32 = 1024;
@@ -154,16 +146,17 @@ impl Facets {
     }
 }
 
-/// Exact exchange between objects; `config.rays` points (or segments) for each pair of faces with something
-/// between them.
+/// Exact exchange times sampled visibility; `config.rays` segments for each pair of faces, rounded
+/// up to a multiple of [`REPLICATES`].
 pub fn analytic_between_objects(world: &World, config: &RayCastConfig) -> ObjectFactors {
     let facets = Facets::new(world);
     let (factors, standard_error) = exchange(world, &facets.all, &facets.areas, config);
     facets.finish(world, factors, standard_error)
 }
 
-/// Exact exchange between all patches, each side of a two-sided face a patch of its own; `config.rays`
-/// points (or segments) for each pair of polygons with something between them.
+/// Exact exchange times sampled visibility between all patches, each side of a two-sided face a
+/// patch of its own; `config.rays` segments for each pair of polygons, rounded up to a multiple of
+/// [`REPLICATES`].
 pub fn analytic_between_patches(
     world: &World,
     patches: &Patches,
@@ -203,12 +196,6 @@ fn exchange(
     areas: &[f64],
     config: &RayCastConfig,
 ) -> (Vec<f64>, Vec<f64>) {
-    let geometry = world.surfaces().geometry();
-    let (face_ids, occluders): (Vec<FaceId>, Vec<Polygon>) = (0..geometry.face_count())
-        .map(FaceId::new)
-        .filter_map(|face| Some((face, Polygon::new(&geometry.polygon(face)).ok()?)))
-        .unzip();
-    let margin = rounding(world);
     // Exchange areas of each pair, by the group of the second one.
     let rows: Vec<Vec<(usize, f64, f64)>> = (0..facets.len())
         .into_par_iter()
@@ -218,36 +205,9 @@ fn exchange(
                 let area = exchange_area(&facets[p].exact, &facets[q].exact, ACCURACY);
                 (area > 0.0).then(|| {
                     let item = (p as u64) << 32 | q as u64;
-                    let pair = [&facets[p], &facets[q]];
-                    let between: Vec<&Polygon> =
-                        candidates(&pair[0].exact, &pair[1].exact, &occluders, margin)
-                            .into_iter()
-                            .filter(|&k| pair.iter().all(|f| !f.faces.contains(&face_ids[k])))
-                            .map(|k| &occluders[k])
-                            .collect();
-                    let (area, error) = match between.len() {
-                        0 => (area, 0.0),
-                        1..=MAX_EXACT => {
-                            let config = AnalyticConfig {
-                                accuracy: ACCURACY,
-                                points: config.rays,
-                                seed: config.seed,
-                            };
-                            let s = exchange_past(
-                                &pair[0].exact,
-                                &pair[1].exact,
-                                &between,
-                                &config,
-                                item,
-                            );
-                            (s.area, s.standard_error)
-                        }
-                        _ => {
-                            let (visible, error) = visibility(world, pair, item, config);
-                            (area * visible, area * error)
-                        }
-                    };
-                    (facets[q].group, area, error)
+                    let (visible, error) =
+                        visibility(world, [&facets[p], &facets[q]], item, config);
+                    (facets[q].group, area * visible, area * error)
                 })
             });
             pairs.collect()
@@ -274,16 +234,6 @@ fn exchange(
         *variance = variance.sqrt() * scale;
     }
     (factors, variance)
-}
-
-/// How far coordinates in the unit frame may be rounded, in units: those of the scene, a few times.
-fn rounding(world: &World) -> f64 {
-    let frame = world.surfaces().geometry().frame();
-    let largest = world
-        .scene()
-        .bounds()
-        .map_or(0.0, |(low, high)| low.abs().max(high.abs()).max_element());
-    8.0 * f64::EPSILON * (largest / frame.metres_per_unit).max(1.0)
 }
 
 /// The visible share of the exchange between two facets, and its standard error.

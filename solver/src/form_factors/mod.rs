@@ -29,6 +29,7 @@ mod ray_cast;
 mod repair;
 mod report;
 mod scene;
+mod segments;
 mod shaft;
 mod visible;
 
@@ -45,4 +46,4 @@ pub use polygon_to_polygon::{exchange_area, polygon_to_polygon};
 pub use ray_cast::{REPLICATES, RayCastConfig, RayCastFactors, ray_cast};
 pub use repair::{Repair, RepairError, Target, repair};
 pub use report::{Closure, closure, reciprocity_defect, reciprocity_defect_of_largest};
-pub use scene::{hemicube_between_objects, hemicube_between_patches};
+pub use scene::{analytic_factors, hemicube_factors};

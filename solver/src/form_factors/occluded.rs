@@ -117,22 +117,42 @@ pub fn analytic(
     occluders: &[Polygon],
     config: &AnalyticConfig,
 ) -> AnalyticFactors {
-    let n = patches.len();
+    analytic_by(patches, |[i, k], [j, l], item| {
+        let (p, q) = (&patches[i][k], &patches[j][l]);
+        occluded_exchange_area(p, q, occluders, config, item)
+    })
+}
+
+/// F between patches from the exchange between any two of their polygons, named by patch and place in
+/// it; the last argument tells pairs apart. The polygons of one patch may see each other: F_ii.
+pub(super) fn analytic_by(
+    patches: &[Vec<Polygon>],
+    exchange: impl Fn([usize; 2], [usize; 2], u64) -> Exchange + Sync,
+) -> AnalyticFactors {
     let areas: Vec<f64> = patches
         .iter()
         .map(|polygons| polygons.iter().map(Polygon::area).sum())
         .collect();
+    let firsts: Vec<u64> = patches
+        .iter()
+        .scan(0, |first, polygons| {
+            let own = *first;
+            *first += polygons.len() as u64;
+            Some(own)
+        })
+        .collect();
     exchange_matrix(&areas, |i, j| {
         let mut total = Exchange::default();
         let mut variance = 0.0;
-        let mut item = (i * n + j) as u64;
-        for p in &patches[i] {
-            for q in &patches[j] {
-                let pair = occluded_exchange_area(p, q, occluders, config, item);
-                total.area += pair.area;
-                variance += pair.standard_error * pair.standard_error;
-                // Another sequence for each pair of polygons.
-                item = item.wrapping_add((n * n) as u64);
+        for k in 0..patches[i].len() {
+            let start = if i == j { k + 1 } else { 0 };
+            for l in start..patches[j].len() {
+                let item = (firsts[i] + k as u64) << 32 | (firsts[j] + l as u64);
+                let pair = exchange([i, k], [j, l], item);
+                // Within a patch, what k sends to l comes back as well.
+                let ways = if i == j { 2.0 } else { 1.0 };
+                total.area += ways * pair.area;
+                variance += (ways * pair.standard_error).powi(2);
             }
         }
         total.standard_error = variance.sqrt();
