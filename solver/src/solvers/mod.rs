@@ -4,6 +4,8 @@
 //! residual and its own error bound. Convergence is judged on the residual r = S + ρFB − B, never on
 //! the size of a step: a step of 10⁻⁶ at ρ = 0.9999 leaves an error of 1 %.
 
+#[cfg(test)]
+mod conformance;
 mod direct;
 mod gauss_seidel;
 mod jacobi;
