@@ -17,7 +17,7 @@ fn sparse() -> SparseRows {
         let first = entries.len();
         for ray in 0..u64::from(RAYS) {
             let random = bits(3, Stage::ROWS, row, ray);
-            if random % 8 != 0 {
+            if !random.is_multiple_of(8) {
                 entries.push((random >> 8) as u32 % UNKNOWNS as u32);
             }
         }
