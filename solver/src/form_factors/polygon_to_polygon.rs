@@ -199,17 +199,23 @@ fn near(p: &Polygon, q: &Polygon, accuracy: f64, depth: u32) -> f64 {
     if let Some(value) = by_lambert() {
         return value;
     }
-    // Halving the larger one separates its far half; polygons of one size that touch stay as they are.
+    // Halving the larger one separates its far half. Where polygons of one size touch, it helps only if
+    // a half does not touch any more: not along a common edge that is halved itself.
     let (large, small) = if p.radius() >= q.radius() {
         (p, q)
     } else {
         (q, p)
     };
-    if large.radius() <= 2.0 * small.radius() && is_touching(p, q) {
+    let halves = large.halves();
+    let is_helping = large.radius() > 2.0 * small.radius()
+        || halves
+            .iter()
+            .flatten()
+            .any(|half| !is_touching(half, small));
+    if !is_helping {
         return contour.value;
     }
-    large
-        .halves()
+    halves
         .iter()
         .flatten()
         .map(|half| near(half, small, accuracy, depth + 1))
