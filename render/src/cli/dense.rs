@@ -6,7 +6,7 @@ use crate::progress::Progress;
 use clap::ValueEnum;
 use luxel_scenes::{Irradiance, Rgb};
 use luxel_solver::form_factors::{
-    RayCastConfig, RayCastFactors, analytic_between_patches, ray_cast,
+    AnalyticConfig, HemicubeConfig, RayCastConfig, analytic_factors, hemicube_factors, ray_cast,
 };
 use luxel_solver::patches::Patches;
 use luxel_solver::solvers::{
@@ -21,11 +21,20 @@ const MAX_PATCHES: usize = 8192;
 /// How form factors between patches are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Factors {
-    /// Exact, times a visibility sampled by this many rays for each pair of polygons.
+    /// Exact; of pairs that something may occlude at this many points.
     Analytic(usize),
+    /// Hemicubes of this resolution.
+    Hemicube(usize),
     /// The fraction of this many rays of each patch that arrive.
     RayCast(usize),
 }
+
+/// Points on a polygon of a pair that something may occlude, by default: a relative error of 1e-3 and
+/// below, in half a millisecond.
+pub(super) const ANALYTIC_POINTS: usize = 400;
+
+/// Pixels along an edge of a hemicube, by default: an error of 1e-3 to 1e-2.
+pub(super) const HEMICUBE_RESOLUTION: usize = 128;
 
 /// What solves the system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -67,19 +76,7 @@ pub(super) fn solve(
         ));
     }
     let n = patches.len();
-    if n > MAX_PATCHES {
-        return Err(Failure::new(
-            ExitCode::Usage,
-            format!(
-                "{n} patches are too many for --form-factors, which stores every pair (at most \
-                 {MAX_PATCHES}); give a larger --patch-size, or leave the option out"
-            ),
-        ));
-    }
-    context.reporter.start("form factors", 1);
-    let computed = compute(world, patches, factors, context.common.seed);
-    context.reporter.finish();
-    let transport = Dense::new(n, computed.factors)?;
+    let (transport, errors) = compute(world, patches, factors, context)?;
 
     let no_lights = vec![Irradiance::ZERO; n];
     let sources = source(patches.emissions(), patches.reflectances(), &no_lights);
@@ -96,8 +93,7 @@ pub(super) fn solve(
         .map(|&area| frame.area_to_world(area))
         .collect();
     let ledger = Ledger::new(&system, &solution, &areas, patches.emissions(), &no_lights);
-    let standard_error = computed
-        .standard_error
+    let standard_error = errors
         .chunks(n.max(1))
         .map(|row| {
             let squares: Rgb = row
@@ -115,13 +111,50 @@ pub(super) fn solve(
     })
 }
 
-fn compute(world: &World<'_>, patches: &Patches, factors: Factors, seed: u64) -> RayCastFactors {
-    match factors {
-        Factors::Analytic(rays) => {
-            analytic_between_patches(world, patches, &RayCastConfig { rays, seed })
-        }
-        Factors::RayCast(rays) => ray_cast(world, patches, &RayCastConfig { rays, seed }),
+/// Form factors between patches with their standard errors, row-major.
+pub(super) fn compute(
+    world: &World<'_>,
+    patches: &Patches,
+    factors: Factors,
+    context: &Context<'_>,
+) -> Result<(Dense, Vec<f64>), Failure> {
+    /// Relative accuracy of pairs that nothing occludes: rounding is not far below.
+    const ACCURACY: f64 = 1e-12;
+    let n = patches.len();
+    if n > MAX_PATCHES {
+        return Err(Failure::new(
+            ExitCode::Usage,
+            format!(
+                "{n} patches are too many for form factors of every pair (at most {MAX_PATCHES}); \
+                 give a larger --patch-size, or let rays answer (form-factors --method raycast, \
+                 solve without --form-factors)"
+            ),
+        ));
     }
+    let seed = context.common.seed;
+    context.reporter.start("form factors", 1);
+    let computed = match factors {
+        Factors::Analytic(points) => {
+            let config = AnalyticConfig {
+                accuracy: ACCURACY,
+                points,
+                seed,
+            };
+            let result = analytic_factors(world, patches, &config);
+            (result.matrix, result.standard_error)
+        }
+        Factors::Hemicube(resolution) => {
+            let config = HemicubeConfig::balanced(resolution);
+            let errors = vec![0.0; n * n];
+            (hemicube_factors(world, patches, &config), errors)
+        }
+        Factors::RayCast(rays) => {
+            let result = ray_cast(world, patches, &RayCastConfig { rays, seed });
+            (Dense::new(n, result.factors)?, result.standard_error)
+        }
+    };
+    context.reporter.finish();
+    Ok(computed)
 }
 
 /// The solver's configuration for a relative bound on the error.

@@ -1,5 +1,6 @@
 //! `luxel form-factors`: how much of what one object sends another receives.
 
+use super::dense::{self, Factors};
 use super::exit::{ExitCode, Failure};
 use super::{Context, Session, scene};
 use crate::files::Output;
@@ -7,17 +8,17 @@ use crate::matrix::NamedMatrix;
 use clap::ValueEnum;
 use luxel_scenes::Scene;
 use luxel_solver::form_factors::{
-    ObjectFactors, RayCastConfig, analytic_between_objects, ray_cast_between_objects,
+    ObjectFactors, RayCastConfig, between_objects, ray_cast_between_objects,
     reciprocity_defect_of_largest,
 };
+use luxel_solver::patches::PatchSize;
 use luxel_solver::transport::{Dense, Transport};
 use luxel_solver::world::World;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Faces up to which pairs of them are integrated exactly: 8 million pairs. More take hours, and
-/// rays give the objects' factors in seconds.
-const MAX_ANALYTIC_FACES: usize = 4096;
+/// Rays of an object whose form factors are ray-cast.
+const RAYS: usize = 1 << 20;
 
 /// Compute form factors between the objects of a scene
 ///
@@ -33,27 +34,66 @@ pub(super) struct FormFactors {
     #[arg(long, value_enum, default_value = "analytic", value_name = "HOW")]
     method: Method,
 
-    /// raycast: rays of each object [default: 1048576]; analytic: visibility rays of each pair of
-    /// faces [default: 512]
+    /// raycast: rays of each object [default: 1048576]; analytic: points for each pair of faces that
+    /// something may occlude [default: 400]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 30))]
     rays: Option<u32>,
+
+    /// hemicube: pixels along an edge, an even number [default: 128]
+    #[arg(long, value_name = "N", value_parser = parse_resolution)]
+    resolution: Option<usize>,
 
     /// Matrix to write
     #[arg(short, long, value_name = "F.csv|F.npy", value_parser = matrix_path)]
     output: Option<PathBuf>,
 }
 
-/// How factors are computed.
+/// How form factors are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Method {
-    /// Exact, times a visibility that rays sample where something stands between
+pub(super) enum Method {
+    /// Exact; pairs that something occludes have a small standard error
     Analytic,
     /// The fraction of rays that arrive
     Raycast,
+    /// Rasterised onto half a cube; biased by its resolution
+    Hemicube,
+}
+
+impl Method {
+    /// The method with its fineness, or the default one; `rays` is the default of ray-casting.
+    pub(super) fn factors(
+        self,
+        fineness: Option<u32>,
+        resolution: Option<usize>,
+        rays: usize,
+    ) -> Factors {
+        let or = |default: usize| fineness.map_or(default, |n| n as usize);
+        match self {
+            Self::Analytic => Factors::Analytic(or(dense::ANALYTIC_POINTS)),
+            Self::Raycast => Factors::RayCast(or(rays)),
+            Self::Hemicube => Factors::Hemicube(resolution.unwrap_or(dense::HEMICUBE_RESOLUTION)),
+        }
+    }
+
+    /// Refuses options that would have no effect on a method.
+    pub(super) fn check_options(
+        method: Option<Self>,
+        rays: Option<u32>,
+        resolution: Option<usize>,
+    ) -> Result<(), Failure> {
+        let problem = match method {
+            Some(Self::Hemicube) if rays.is_some() => "hemicubes have --resolution, not --rays",
+            Some(Self::Hemicube) => return Ok(()),
+            _ if resolution.is_some() => "--resolution belongs to the method hemicube",
+            _ => return Ok(()),
+        };
+        Err(Failure::new(ExitCode::Usage, problem))
+    }
 }
 
 impl FormFactors {
     pub(super) fn run(self, session: &mut Session<'_>) -> Result<ExitCode, Failure> {
+        Method::check_options(Some(self.method), self.rays, self.resolution)?;
         let started = Instant::now();
         let output = self.output.as_deref().map(Output::prepare).transpose()?;
         let scene = scene::read(&self.scene, &session.context)?;
@@ -79,10 +119,15 @@ impl FormFactors {
         }
         let seconds = started.elapsed().as_secs_f64();
         let reciprocity = reciprocity_defect_of_largest(&matrix, &factors.areas);
+        let sampled = self.method != Method::Hemicube;
         let largest = factors.standard_error.iter().copied().fold(0.0, f64::max);
+        let error = if sampled {
+            format!("largest standard error {largest:.1e}, ")
+        } else {
+            String::new()
+        };
         context.reporter.note(format_args!(
-            "{n} objects, {seconds:.2} s; largest standard error {largest:.1e}, reciprocity defect \
-             {reciprocity:.1e}"
+            "{n} objects, {seconds:.2} s; {error}reciprocity defect {reciprocity:.1e}"
         ));
         let text = if context.common.json {
             let sums: Vec<f64> = (0..n).map(|row| matrix.row_sum(row)).collect();
@@ -90,7 +135,8 @@ impl FormFactors {
                 "objects": named.names,
                 "areas": factors.areas,
                 "F": named.rows,
-                "standard_error": rows(&factors.standard_error),
+                // What hemicubes get wrong is a bias, which does not show as scatter.
+                "standard_error": sampled.then(|| rows(&factors.standard_error)),
                 "row_sums": sums,
                 "reciprocity": reciprocity,
                 "method": super::name(&self.method),
@@ -110,22 +156,17 @@ impl FormFactors {
 
     fn compute(&self, scene: &Scene, context: &Context<'_>) -> Result<ObjectFactors, Failure> {
         let world = World::new(scene);
-        let config = |default: usize| RayCastConfig {
-            rays: self.rays.map_or(default, |rays| rays as usize),
-            seed: context.common.seed,
-        };
-        match self.method {
-            Method::Raycast => Ok(ray_cast_between_objects(&world, &config(1 << 20))),
-            Method::Analytic if scene.faces.len() > MAX_ANALYTIC_FACES => Err(Failure::new(
-                ExitCode::Usage,
-                format!(
-                    "{} faces are too many for --method analytic, which takes every pair of them \
-                     (at most {MAX_ANALYTIC_FACES} faces); use --method raycast",
-                    scene.faces.len()
-                ),
-            )),
-            Method::Analytic => Ok(analytic_between_objects(&world, &config(512))),
+        let factors = self.method.factors(self.rays, self.resolution, RAYS);
+        if let Factors::RayCast(rays) = factors {
+            let seed = context.common.seed;
+            return Ok(ray_cast_between_objects(
+                &world,
+                &RayCastConfig { rays, seed },
+            ));
         }
+        let patches = world.mesh(PatchSize::Whole)?;
+        let (matrix, errors) = dense::compute(&world, &patches, factors, context)?;
+        Ok(between_objects(&world, &patches, &matrix, &errors))
     }
 }
 
@@ -149,5 +190,17 @@ fn matrix_path(text: &str) -> Result<PathBuf, String> {
         Ok(path)
     } else {
         Err("the matrix is written as CSV or NPY: end its name in .csv or .npy".into())
+    }
+}
+
+/// An even number of pixels.
+pub(super) fn parse_resolution(text: &str) -> Result<usize, String> {
+    /// Largest resolution: three gigabytes of pixels for each thread lie above it.
+    const MAX: usize = 8192;
+    match text.parse() {
+        Ok(n) if (2..=MAX).contains(&n) && n % 2 == 0 => Ok(n),
+        _ => Err(format!(
+            "an even number of pixels from 2 to {MAX} is needed"
+        )),
     }
 }

@@ -1,13 +1,13 @@
 //! `luxel solve`: radiosity by object, convergence, and where the light goes.
 
-use super::dense::{self, DenseSolution, Factors, Solver};
+use super::dense::{self, DenseSolution, Solver};
 use super::exit::{ExitCode, Failure};
+use super::form_factors::Method;
 use super::scene;
 use super::transport::{Purpose, Transport};
 use super::{Context, Session};
 use crate::files::Output;
 use crate::solution::{ObjectLight, PatchLight, emitted_flux};
-use clap::ValueEnum;
 use luxel_scenes::{Irradiance, Radiosity, Rgb};
 use luxel_solver::patches::PatchSize;
 use luxel_solver::radiosity::RadiositySolution;
@@ -22,6 +22,9 @@ const REPLICATES: u32 = 4;
 
 /// Patches of a mesh whose size is not given.
 const PATCHES: usize = 4000;
+
+/// Rays of a patch whose form factors are ray-cast.
+const RAYS: usize = 65_536;
 
 /// Patches of such a mesh when every pair has a form factor.
 const DENSE_PATCHES: usize = 1000;
@@ -48,10 +51,14 @@ pub(super) struct Solve {
     #[arg(long, value_enum, value_name = "NAME", requires = "form_factors")]
     solver: Option<Solver>,
 
-    /// Rays of each patch [default: 256; raycast: 65536]; analytic: visibility rays of each pair of
-    /// polygons [default: 64]
+    /// Rays of each patch [default: 256; raycast: 65536]; analytic: points for each pair of polygons
+    /// that something may occlude [default: 400]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
     rays: Option<u32>,
+
+    /// With --form-factors hemicube: pixels along an edge, an even number [default: 128]
+    #[arg(long, value_name = "N", value_parser = super::form_factors::parse_resolution)]
+    resolution: Option<usize>,
 
     /// Bound on the error that the iteration may leave, relative to the brightest patch
     #[arg(long, value_name = "T", default_value_t = 1e-7, value_parser = parse_tolerance)]
@@ -60,15 +67,6 @@ pub(super) struct Solve {
     /// Mesh with vertex colours to write
     #[arg(short, long, value_name = "OUT.ply")]
     output: Option<PathBuf>,
-}
-
-/// How form factors of every pair of patches are computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Method {
-    /// Exact, times a visibility that rays sample where something stands between
-    Analytic,
-    /// The fraction of rays that arrive
-    Raycast,
 }
 
 /// What is reported.
@@ -96,12 +94,16 @@ struct Energy {
 struct Error {
     /// Bound on what the iteration leaves, over the brightest patch.
     solver: f64,
-    /// Standard error of the objects' irradiances, root mean square over mean.
-    sampling: f64,
+    /// Standard error of the irradiance, root mean square over mean; `None` for hemicubes, whose
+    /// error is a bias.
+    sampling: Option<f64>,
 }
 
 impl Solve {
     pub(super) fn run(self, session: &mut Session<'_>) -> Result<ExitCode, Failure> {
+        if self.form_factors.is_some() || self.resolution.is_some() {
+            Method::check_options(self.form_factors, self.rays, self.resolution)?;
+        }
         let started = Instant::now();
         let output = self.output.as_deref().map(Output::prepare).transpose()?;
         let scene = scene::read(&self.scene, &session.context)?;
@@ -127,13 +129,15 @@ impl Solve {
                 "the iteration stopped at its limit before the tolerance; the error bound is valid",
             );
         }
+        let sampling = report.error.sampling.map_or(String::new(), |sampling| {
+            format!(
+                ", sampling error {:.2} % of the mean irradiance",
+                100.0 * sampling
+            )
+        });
         context.reporter.note(format_args!(
-            "{} patches, {} sweeps, {total:.2} s; solver error below {:.1e}, sampling error {:.2} % \
-             of the mean irradiance",
-            report.patches,
-            report.iterations,
-            report.error.solver,
-            100.0 * report.error.sampling
+            "{} patches, {} sweeps, {total:.2} s; solver error below {:.1e}{sampling}",
+            report.patches, report.iterations, report.error.solver
         ));
         let text = if session.context.common.json {
             serde_json::to_string_pretty(&report.to_json(self.output.as_deref()))?
@@ -188,7 +192,7 @@ impl Solve {
             ),
             error: Error {
                 solver: largest(|solution| solution.error_bound).max_element() / light.brightest(),
-                sampling: sampling_error(&each),
+                sampling: Some(sampling_error(&each)),
             },
             converged: solutions.iter().all(|s| s.outcome == Outcome::Converged),
             seconds: vec![("solve", solved)],
@@ -205,11 +209,7 @@ impl Solve {
         context: &Context<'_>,
     ) -> Result<Report, Failure> {
         let started = Instant::now();
-        let rays = |default: usize| self.rays.map_or(default, |rays| rays as usize);
-        let factors = match method {
-            Method::Analytic => Factors::Analytic(rays(64)),
-            Method::Raycast => Factors::RayCast(rays(65_536)),
-        };
+        let factors = method.factors(self.rays, self.resolution, RAYS);
         let size = self.patch_size.unwrap_or(PatchSize::Count(DENSE_PATCHES));
         let patches = world.mesh(size)?;
         let solver = self.solver.unwrap_or(Solver::GaussSeidel);
@@ -252,7 +252,7 @@ impl Solve {
             },
             error: Error {
                 solver: solution.error_bound.max_element() / light.brightest(),
-                sampling: if level > 0.0 { sampling } else { 0.0 },
+                sampling: (method != Method::Hemicube && level > 0.0).then_some(sampling),
             },
             converged: solution.outcome == Outcome::Converged,
             seconds: vec![("solve", seconds)],

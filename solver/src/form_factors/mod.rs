@@ -34,9 +34,7 @@ mod shaft;
 mod visible;
 
 pub use assembly::unoccluded_matrix;
-pub use between_objects::{
-    ObjectFactors, analytic_between_objects, analytic_between_patches, ray_cast_between_objects,
-};
+pub use between_objects::{ObjectFactors, between_objects, ray_cast_between_objects};
 pub use clip::{Plane, clip};
 pub use hemicube::{Facet, FacetSide, Hemicube, HemicubeConfig, hemicube};
 pub use occluded::{AnalyticConfig, AnalyticFactors, Exchange, analytic, occluded_exchange_area};
