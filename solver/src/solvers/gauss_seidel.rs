@@ -171,7 +171,7 @@ mod tests {
             // The bound is exact arithmetic; the residual rounds by n units of B.
             assert!(
                 residual.largest.cmple(bound.largest + 1e-13).all()
-                    && residual.rms.cmple(bound.rms + 1e-13).all(),
+                    && residual.mean.cmple(bound.mean + 1e-13).all(),
                 "{residual:?} {bound:?}"
             );
         }

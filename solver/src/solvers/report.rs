@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 /// When an iteration may stop. Each of the three channels must satisfy it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
-    /// ‖r‖₂ ≤ t ‖r₀‖₂, relative to the residual r₀ = ρFS of the start B = S: the share of the first
+    /// ‖r‖₁ ≤ t ‖r₀‖₁, relative to the residual r₀ = ρFS of the start B = S: the share of the first
     /// bounce that is not yet accounted for. Says how far the iteration has come, not how large
     /// the error is. It takes ln t / ln λ sweeps, λ the spectral radius of the iteration.
     Residual(f64),
@@ -75,29 +75,29 @@ pub struct Solution {
 pub(super) struct Residual {
     /// ‖r‖∞, which the error bound is made of.
     pub(super) largest: Rgb,
-    /// ‖r‖₂/√n.
-    pub(super) rms: Rgb,
+    /// ‖r‖₁/n.
+    pub(super) mean: Rgb,
 }
 
 impl Residual {
     /// The size of a residual from its elements.
     pub(super) fn of(elements: impl Iterator<Item = Rgb>) -> Self {
-        let (mut largest, mut squares, mut count) = (Rgb::ZERO, Rgb::ZERO, 0_usize);
+        let (mut largest, mut sum, mut count) = (Rgb::ZERO, Rgb::ZERO, 0_usize);
         for r in elements {
             largest = largest.max(r.abs());
-            squares += r * r;
+            sum += r.abs();
             count += 1;
         }
-        let rms = squares / count.max(1) as f64;
         Self {
             largest,
-            rms: Rgb::new(rms.x.sqrt(), rms.y.sqrt(), rms.z.sqrt()),
+            mean: sum / count.max(1) as f64,
         }
     }
 
     /// True when no channel is above `limit` times `factor`.
     pub(super) fn is_within(&self, limit: &Self, factor: f64) -> bool {
-        self.largest.cmple(limit.largest * factor).all() && self.rms.cmple(limit.rms * factor).all()
+        self.largest.cmple(limit.largest * factor).all()
+            && self.mean.cmple(limit.mean * factor).all()
     }
 }
 
@@ -113,7 +113,7 @@ impl Tolerance {
         match self {
             Self::Residual(t) => Residual {
                 largest: any,
-                rms: first.rms * t,
+                mean: first.mean * t,
             },
             Self::Error(t) => {
                 let brightest = radiosity
@@ -121,7 +121,7 @@ impl Tolerance {
                     .fold(Rgb::ZERO, |largest, b| largest.max(b.0.abs()));
                 Residual {
                     largest: brightest * (Rgb::ONE - system.gain()) * t,
-                    rms: any,
+                    mean: any,
                 }
             }
         }
