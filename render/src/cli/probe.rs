@@ -14,6 +14,7 @@ use clap::ValueEnum;
 use glam::DVec3;
 use luxel_scenes::{Rgb, UnitSystem};
 use luxel_solver::gather::{Components, GatherConfig, Key, gather};
+use luxel_solver::patches::PatchSize;
 use luxel_solver::world::{Receiver, World};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -238,7 +239,14 @@ fn gather_irradiance(
         components,
         seed: context.common.seed,
     };
-    let transport = Transport::solve(world, Purpose::Gather(REPLICATES), context)?;
+    let transport = if components == Components::Direct {
+        // Nothing is looked up: any mesh tells fronts from backs.
+        let patches = world.mesh(PatchSize::Whole)?;
+        let solutions = Vec::new();
+        Transport { patches, solutions }
+    } else {
+        Transport::solve(world, Purpose::Gather(REPLICATES), context)?
+    };
     let Transport { patches, solutions } = &transport;
     // In parts, so that progress shows; a receiver's value does not depend on its part.
     let part = (receivers.len() / 50).max(64);

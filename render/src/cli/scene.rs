@@ -37,7 +37,7 @@ pub(super) fn require_light(world: &World<'_>) -> Result<(), Failure> {
         let mut faces = scene.face_ids();
         faces.any(|face| scene.material(face).is_emissive())
     };
-    if lights.has_sky() || !lights.sources().is_empty() || emits() {
+    if lights.are_found_by_rays() || !lights.sources().is_empty() || emits() {
         return Ok(());
     }
     Err(Failure::new(

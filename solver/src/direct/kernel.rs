@@ -9,7 +9,7 @@
 //! errors of 0.2–0.5 % that no number of points removes.
 //!
 //! Where a light gets many rays from one point, rejections would spoil their stratification: there
-//! [`warped`] draws points by a warp that is nearly the kernel and returns what is left as a weight,
+//! [`Luminaire::warped`] draws points by a warp that is nearly the kernel and returns what is left as a weight,
 //! for a ratio estimate Σ w v / Σ w, whose bias is O(1/n) times the small scatter of the weights.
 //!
 //! Source: J. Arvo, "Stratified Sampling of Spherical Triangles", SIGGRAPH 1995; rejection after
@@ -109,6 +109,28 @@ impl Luminaire {
         draw_by_solid_angle(position, normal, scratch, sequence, index)
     }
 
+    /// A point distributed nearly as the kernel, with its weight: kernel over density, up to a
+    /// constant; `None` when the part above the horizon covers no solid angle.
+    pub(super) fn warped(
+        &self,
+        position: DVec3,
+        normal: DVec3,
+        u: [f64; 2],
+        scratch: &mut Vec<DVec3>,
+    ) -> Option<(DVec3, f64)> {
+        if self.corners.len() > MAX_FAN {
+            let point = self.by_area.as_ref()?.sample(u);
+            let to = point - position;
+            return Some((point, normal.dot(to).max(0.0) / to.length().powi(4)));
+        }
+        let plane = Plane {
+            point: position,
+            normal,
+        };
+        clip(&self.corners, &plane, scratch);
+        warp_by_solid_angle(position, normal, scratch, u)
+    }
+
     /// A distance that no point of the polygon is nearer than: that of its plane or of its bounding
     /// sphere.
     fn nearest(&self, polygon: &Polygon, position: DVec3) -> f64 {
@@ -174,7 +196,7 @@ fn draw_by_solid_angle(
 
 /// A point of `polygon` (the part above the horizon) distributed nearly as the kernel, with its
 /// weight: kernel over density, up to a constant; `None` when it covers no solid angle.
-pub(super) fn warped(
+fn warp_by_solid_angle(
     position: DVec3,
     normal: DVec3,
     polygon: &[DVec3],
@@ -182,12 +204,6 @@ pub(super) fn warped(
 ) -> Option<(DVec3, f64)> {
     if polygon.len() < 3 {
         return None;
-    }
-    if polygon.len() > MAX_FAN {
-        let sampler = Polygon::new(polygon)?;
-        let point = sampler.sample([x, y]);
-        let to = point - position;
-        return Some((point, normal.dot(to).max(0.0) / to.length().powi(4)));
     }
     let mut fan = [None; MAX_FAN];
     let mut solid_angle = 0.0;

@@ -88,6 +88,7 @@ pub struct Lights {
     /// True for faces whose emission is a source here: rays that meet them must not count it again.
     is_source: Vec<bool>,
     sky: Option<SkyDome>,
+    are_found_by_rays: bool,
 }
 
 impl Lights {
@@ -175,10 +176,16 @@ impl Lights {
                 LightKind::Sky { .. } | LightKind::Environment { .. } => {}
             }
         }
+        let sky = SkyDome::new(scene);
+        let are_found_by_rays = sky.is_some()
+            || scene
+                .face_ids()
+                .any(|face| surfaces.material(face).is_emissive() && !is_source[face.index()]);
         Self {
             sources,
             is_source,
-            sky: SkyDome::new(scene),
+            sky,
+            are_found_by_rays,
         }
     }
 
@@ -199,9 +206,10 @@ impl Lights {
         })
     }
 
-    /// True when directions without a face are not black.
-    pub fn has_sky(&self) -> bool {
-        self.sky.is_some()
+    /// True when some direct light does not come from [`Self::sources`]: a sky, textured emission,
+    /// emissive faces beyond the brightest. Rays from the receiver find it.
+    pub fn are_found_by_rays(&self) -> bool {
+        self.are_found_by_rays
     }
 }
 

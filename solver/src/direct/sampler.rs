@@ -8,10 +8,8 @@
 //! is wholly visible or wholly hidden; unbiased but for lights of [`MANY_RAYS`] rays and more, whose
 //! bias is far below their noise.
 
-use super::kernel;
 use super::lights::{Lights, Source};
 use crate::bvh::{Bvh, Ray};
-use crate::form_factors::{Plane, clip};
 use crate::geometry::ray_origin;
 use crate::sampling::Sequence;
 use glam::{DVec3, Vec3};
@@ -240,21 +238,23 @@ impl<'a> DirectSampler<'a> {
                         &mut self.clipped,
                     )
                 } else {
-                    let plane = Plane {
-                        point: sample.position,
-                        normal: sample.normal,
-                    };
-                    clip(shape.corners(), &plane, &mut self.clipped);
                     let u = sequence.point2(index);
-                    kernel::warped(sample.position, sample.normal, &self.clipped, u).map(
-                        |(point, kernel)| {
+                    let (position, normal) = (sample.position, sample.normal);
+                    shape
+                        .warped(position, normal, u, &mut self.clipped)
+                        .map(|(point, kernel)| {
                             weight = kernel;
                             point
-                        },
-                    )
+                        })
                 };
                 // Without solid angle in f64 there is no irradiance beyond rounding either.
-                ray_origin(point.unwrap_or(shape.corners()[0]), *normal, *extent)
+                // The rounding of an origin far outside the scene counts as well.
+                let reach = f64::from(sample.origin.abs().max_element());
+                ray_origin(
+                    point.unwrap_or(shape.corners()[0]),
+                    *normal,
+                    extent.max(reach),
+                )
             }
             Source::Point { position, .. } => position.as_vec3(),
             Source::Directional { towards, .. } => {

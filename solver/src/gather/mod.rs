@@ -37,7 +37,7 @@ pub enum Components {
     All,
     /// From the sources without reflection.
     Direct,
-    /// After at least one reflection, and light of sources that rays find: the sky.
+    /// After at least one reflection.
     Indirect,
 }
 
@@ -101,8 +101,8 @@ impl Gathered {
 /// is wanted.
 ///
 /// # Panics
-/// When `keys` is not as long as `receivers`, the number of replicates is out of range, or indirect light is wanted and there is not one
-/// solution for each replicate.
+/// When `keys` is not as long as `receivers`, the number of replicates is out of range, or indirect
+/// light is wanted and there is not one solution for each replicate.
 pub fn gather(
     world: &World,
     patches: &Patches,
@@ -143,13 +143,17 @@ pub fn gather(
                         &mut totals,
                     );
                 }
-                if let Some(solution) = solutions.get(replicate).filter(|_| wants_indirect) {
+                if wants_indirect || world.lights().are_found_by_rays() {
                     let rays = share(config.rays, replicates, replicate);
                     let seed = replicate_seed(config.seed, replicate);
-                    chains.gather(solution, receivers, keys, seed, rays, |slot, sum, backs| {
+                    let solution = solutions.get(replicate).filter(|_| wants_indirect);
+                    chains.gather(solution, receivers, keys, seed, rays, |slot, found| {
                         let total = &mut totals[slot];
-                        total.indirect[replicate] += sum / rays as f64;
-                        total.backs += backs;
+                        if config.components != Components::Indirect {
+                            total.direct[replicate] += found.direct / rays as f64;
+                        }
+                        total.indirect[replicate] += found.indirect / rays as f64;
+                        total.backs += found.backs;
                         total.rays += rays;
                     });
                 }

@@ -30,6 +30,28 @@ struct Path {
     throughput: Rgb,
 }
 
+/// What the rays of a receiver found, as sums of B over them.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Found {
+    /// Light of sources that shadow rays do not reach: the sky, emission beyond the exact sources.
+    pub(super) direct: Rgb,
+    /// Reflected light.
+    pub(super) indirect: Rgb,
+    /// Rays that met the back of a one-sided face.
+    pub(super) backs: usize,
+}
+
+impl Found {
+    /// Where light that is emitted where a chain's link ends belongs.
+    fn emitted(&mut self, link: u32) -> &mut Rgb {
+        if link == 0 {
+            &mut self.direct
+        } else {
+            &mut self.indirect
+        }
+    }
+}
+
 /// Scratch space for gathering a batch of receivers.
 pub(super) struct Chains<'a> {
     world: &'a World<'a>,
@@ -53,18 +75,18 @@ impl<'a> Chains<'a> {
     }
 
     /// Casts `rays` rays from each receiver and follows them; `add` is called once a receiver with
-    /// its position in the batch, the sum of B over its rays, and the number of back hits.
+    /// its position in the batch and what its rays found. Without a solution only the light of
+    /// sources that rays find is collected.
     pub(super) fn gather(
         &mut self,
-        solution: &RadiositySolution,
+        solution: Option<&RadiositySolution>,
         receivers: &[Receiver],
         keys: &[Key],
         seed: u64,
         rays: usize,
-        mut add: impl FnMut(usize, Rgb, usize),
+        mut add: impl FnMut(usize, Found),
     ) {
-        let mut sums = vec![Rgb::ZERO; receivers.len()];
-        let mut backs = vec![0; receivers.len()];
+        let mut found = vec![Found::default(); receivers.len()];
         self.start(receivers, keys, seed, rays);
         for link in 0.. {
             if self.paths.is_empty() {
@@ -72,11 +94,11 @@ impl<'a> Chains<'a> {
             }
             self.hits.resize(self.rays.len(), Hit::MISS);
             self.world.bvh().closest_hits(&self.rays, &mut self.hits);
-            let near = self.look_up(solution, link, &mut sums, &mut backs);
-            self.go_on(near, keys, seed, link, &mut sums);
+            let near = self.look_up(solution, link, &mut found);
+            self.go_on(near, keys, seed, link, &mut found);
         }
-        for (slot, (sum, backs)) in sums.into_iter().zip(backs).enumerate() {
-            add(slot, sum, backs);
+        for (slot, found) in found.into_iter().enumerate() {
+            add(slot, found);
         }
     }
 
@@ -103,19 +125,18 @@ impl<'a> Chains<'a> {
     /// Adds what can be looked up; returns the paths that must go on, with the place to go on from.
     fn look_up(
         &self,
-        solution: &RadiositySolution,
+        solution: Option<&RadiositySolution>,
         link: u32,
-        sums: &mut [Rgb],
-        backs: &mut [usize],
+        found: &mut [Found],
     ) -> Vec<(Path, Receiver)> {
         let surfaces = self.world.surfaces();
         let lights = self.world.lights();
         let mut near = Vec::new();
         for ((path, ray), hit) in self.paths.iter().zip(&self.rays).zip(&self.hits) {
-            let sum = &mut sums[path.receiver as usize];
+            let found = &mut found[path.receiver as usize];
             let Some(interaction) = self.world.interaction(ray, hit) else {
                 let sky = lights.sky(surfaces, ray.direction.as_dvec3());
-                *sum += path.throughput * sky.to_irradiance().0;
+                *found.emitted(link) += path.throughput * sky.to_irradiance().0;
                 continue;
             };
             let point = interaction.point;
@@ -126,19 +147,21 @@ impl<'a> Chains<'a> {
                 point.v,
                 interaction.side,
             ) else {
-                backs[path.receiver as usize] += usize::from(link == 0);
+                found.backs += usize::from(link == 0);
                 continue;
             };
             if !lights.is_source(interaction.face) {
-                *sum += path.throughput * surfaces.emission(point).to_radiosity().0;
+                let emitted = surfaces.emission(point).to_radiosity();
+                *found.emitted(link) += path.throughput * emitted.0;
             }
+            let Some(solution) = solution else { continue };
             let throughput = path.throughput * surfaces.reflectance(point).0;
             if throughput == Rgb::ZERO {
                 continue;
             }
             let class = Class::at(hit.t, self.patches.size(patch));
             if class == Class::Far || link == MAX_LINKS {
-                *sum += throughput * solution.irradiance(patch, class).0;
+                found.indirect += throughput * solution.irradiance(patch, class).0;
             } else {
                 near.push((
                     Path {
@@ -159,7 +182,7 @@ impl<'a> Chains<'a> {
         keys: &[Key],
         seed: u64,
         link: u32,
-        sums: &mut [Rgb],
+        found: &mut [Found],
     ) {
         let sequence = |path: &Path, stage| {
             Sequence::new(seed, stage, keys[path.receiver as usize].item).dimension_set(link)
@@ -180,7 +203,7 @@ impl<'a> Chains<'a> {
         self.paths.clear();
         self.rays.clear();
         for ((mut path, receiver), direct) in near.into_iter().zip(direct) {
-            sums[path.receiver as usize] += path.throughput * direct.0;
+            found[path.receiver as usize].indirect += path.throughput * direct.0;
             let u = sequence(&path, Stage::NEAR_CHAIN).point4_f32(path.ray);
             if link > 0 {
                 let survival = path.throughput.max_element().min(1.0);

@@ -19,6 +19,11 @@ const CONFIG: GatherConfig = GatherConfig {
     seed: 3,
 };
 
+const DIRECT: GatherConfig = GatherConfig {
+    components: Components::Direct,
+    ..CONFIG
+};
+
 fn solutions(
     world: &World,
     patches: &crate::patches::Patches,
@@ -182,6 +187,14 @@ fn a_uniform_sky_fills_the_hemisphere() {
         error < 5.0 * gathered[1].standard_error.0.x + 1e-12,
         "{error}"
     );
+    // It is direct light, also when nothing else is asked for.
+    for (all, direct) in gathered
+        .iter()
+        .zip(gather_at(&scene, &points, PatchSize::Whole, &DIRECT))
+    {
+        assert_eq!(all.direct, direct.direct);
+        assert_eq!(direct.indirect, Irradiance::ZERO);
+    }
 }
 
 /// A sealed dark box beside a lit one, sharing a wall of no thickness, stays black.
@@ -287,11 +300,7 @@ fn unoccluded_direct_light_is_exact() {
     ];
     scene.push_face(&lamp, object, material);
     let points = [(DVec3::ZERO, DVec3::Y), (v(10.0, 0.0, 0.0), DVec3::Y)];
-    let config = GatherConfig {
-        components: Components::Direct,
-        ..CONFIG
-    };
-    let gathered = gather_at(&scene, &points, PatchSize::Whole, &config);
+    let gathered = gather_at(&scene, &points, PatchSize::Whole, &DIRECT);
     // Howell B-3 corner sums (forty digits), rounded.
     for (gathered, expected) in gathered
         .iter()
