@@ -148,7 +148,7 @@ impl Solve {
         Ok(ExitCode::Ok)
     }
 
-    /// Sparse rows in two classes, direct light apart.
+    /// Sparse rows in classes, direct light apart.
     fn solve_rows(&self, world: &World<'_>, context: &Context<'_>) -> Result<Report, Failure> {
         let started = Instant::now();
         let purpose = Purpose::Solve {

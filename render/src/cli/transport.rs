@@ -13,7 +13,7 @@ use luxel_solver::world::World;
 /// 0.82 % (corridor), 1.38 to 1.27 % (office) at 1.4 times the time.
 const GATHER_PATCHES: usize = 6000;
 
-/// Rays of a patch's row in each such solution. 64 measured no better; 16 biases the near class,
+/// Rays of a patch's row in each such solution. 64 measured no better; 16 biases the near classes,
 /// whose rows are then often empty.
 const GATHER_ROW_RAYS: usize = 32;
 

@@ -13,7 +13,7 @@
 //!
 //! Sources: M. C. Reichert, "A Two-Pass Radiosity Method Driven by Lights and Viewer Position",
 //! master's thesis, Cornell, 1992 (the gather into a radiosity solution); the near chain and the
-//! two classes are luxel's own. Cost: M rays and S shadow rays a receiver; half the rays of a
+//! classes of a patch are luxel's own. Cost: M rays and S shadow rays a receiver; half the rays of a
 //! furnished room continue once.
 
 mod near_chain;

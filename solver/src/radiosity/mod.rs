@@ -1,6 +1,6 @@
 //! Radiosity of a scene from ray-cast rows: the coarse solution that a final gather looks up.
 //!
-//! Each patch carries two unknowns, the *far* and the *near* class (see `rows`). Direct light is
+//! Each patch carries several unknowns, its [classes](Class). Direct light is
 //! computed apart at the sample points of the patches, so that the system carries reflected light
 //! only: B = ρ (E^direct + F B).
 
@@ -12,29 +12,50 @@ use crate::solvers::{self, Config, Ledger, Outcome, System, SystemError};
 use crate::world::World;
 use luxel_scenes::{Exitance, Irradiance, Radiosity, Reflectance, Rgb};
 
-/// The two unknowns of a patch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Class {
-    /// The patch as it is seen by rays longer than its size.
-    Far,
-    /// The patch as it is seen from nearby.
-    Near,
-}
+/// The unknowns of a patch: how it looks from afar, and from distances ever smaller than its size.
+///
+/// Rays of a class meet the parts of a patch that are seen from such a distance, and these parts
+/// are what the irradiance of the class is averaged over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Class(u8);
 
 impl Class {
+    /// Number of classes, a tuned value. With one, light of the open part of a patch leaks into what
+    /// the patch hides. Measured on a furnished office at 6000 patches and 8192 rays: bias and nRMSE
+    /// are -0.54 and 0.91 % with two, -0.45 and 0.85 % with three, -0.40 and 0.81 % with four, and
+    /// no better with six, whose rows are often empty; a bare box does not care.
+    pub const COUNT: usize = 4;
+
+    /// The patch as it is seen by rays longer than its size.
+    pub const FAR: Self = Self(0);
+
+    /// All classes, the farthest first.
+    pub fn all() -> [Self; Self::COUNT] {
+        std::array::from_fn(|index| Self(index as u8))
+    }
+
     /// The class in which a patch of the given size is seen from the given distance.
     pub fn at(distance: f32, size: f32) -> Self {
-        if distance < size {
-            Self::Near
-        } else {
-            Self::Far
+        let mut class = 0;
+        let mut limit = size;
+        while distance < limit && usize::from(class) + 1 < Self::COUNT {
+            class += 1;
+            limit /= RATIO;
         }
+        Self(class)
+    }
+
+    fn index(self) -> usize {
+        usize::from(self.0)
     }
 }
 
+/// Ratio of the distances at which classes begin. Eight measured the same with four classes.
+const RATIO: f32 = 4.0;
+
 /// Index of a patch's class among the unknowns.
 pub(crate) fn unknown(patch: PatchId, class: Class) -> usize {
-    2 * patch.index() + usize::from(class == Class::Near)
+    Class::COUNT * patch.index() + class.index()
 }
 
 /// How rows are cast and the system is solved.
@@ -52,7 +73,7 @@ pub struct RadiosityConfig {
     pub replicate: u64,
 }
 
-/// Light received by the patches of a scene, in two classes.
+/// Light received by the patches of a scene, by class.
 pub struct RadiositySolution {
     irradiance: Vec<Irradiance>,
     rays: Vec<u32>,
@@ -80,13 +101,13 @@ impl RadiositySolution {
 
     /// Mean irradiance of a patch over its area in W/m².
     pub fn mean_irradiance(&self, patch: PatchId) -> Irradiance {
-        let [far, near] = [Class::Far, Class::Near].map(|class| unknown(patch, class));
-        let [far_rays, near_rays] = [far, near].map(|unknown| f64::from(self.rays[unknown]));
-        let total = far_rays + near_rays;
-        if total == 0.0 {
-            return Irradiance::ZERO;
-        }
-        self.irradiance[far] * (far_rays / total) + self.irradiance[near] * (near_rays / total)
+        let unknowns = Class::all().map(|class| unknown(patch, class));
+        let total: f64 = unknowns.iter().map(|&u| f64::from(self.rays[u])).sum();
+        unknowns
+            .iter()
+            .filter(|&&u| self.rays[u] > 0)
+            .map(|&u| self.irradiance[u] * (f64::from(self.rays[u]) / total))
+            .sum()
     }
 }
 
@@ -104,7 +125,10 @@ pub fn solve(
 ) -> Result<RadiositySolution, SystemError> {
     let cast = rows::cast(world, patches, config);
     let per_class = |values: &[Reflectance]| -> Vec<Reflectance> {
-        values.iter().flat_map(|&value| [value, value]).collect()
+        values
+            .iter()
+            .flat_map(|&value| [value; Class::COUNT])
+            .collect()
     };
     let reflectance = per_class(patches.reflectances());
     let gathered = gathered_emission(world.lights(), patches);
@@ -121,10 +145,9 @@ pub fn solve(
         .flat_map(|index| {
             let patch = PatchId::new(index);
             let area = frame.area_to_world(patches.areas()[index]);
-            let [far, near] =
-                [Class::Far, Class::Near].map(|c| f64::from(cast.weights[unknown(patch, c)]));
-            let total = (far + near).max(1.0);
-            [area * far / total, area * near / total]
+            let weights = Class::all().map(|c| f64::from(cast.weights[unknown(patch, c)]));
+            let total = weights.iter().sum::<f64>().max(1.0);
+            weights.map(|weight| area * weight / total)
         })
         .collect();
     let ledger = Ledger::new(&system, &solution, &areas, &gathered, &cast.direct);
@@ -158,7 +181,7 @@ fn gathered_emission(lights: &Lights, patches: &Patches) -> Vec<Exitance> {
             } else {
                 patches.emissions()[patch.index()]
             };
-            [emission, emission]
+            [emission; Class::COUNT]
         })
         .collect()
 }

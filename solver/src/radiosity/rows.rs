@@ -1,17 +1,18 @@
-//! Casts the rows of the two-class system and the direct light at the same points.
+//! Casts the rows of the system and the direct light at the same points.
 //!
-//! From each of K/2 points of a patch two cosine-distributed rays leave. A ray counts as *near* at
-//! its hit when it is shorter than the size of the patch that it meets, and the point that it
-//! leaves counts as near or far by the length of its partner: places that see nearby surfaces
-//! (corners, crevices, the floor beneath a table) are seen by short rays, the open parts of the
-//! same patch by long ones. Weighting by the partner and not by the ray itself keeps the two
-//! classes' irradiances unbiased by the ray's own length. It costs no ray and halves the error
-//! that patches of finite size make among furniture.
+//! From each of K/2 points of a patch two cosine-distributed rays leave. A ray belongs, at its hit,
+//! to the [class](Class) of its length against the size of the patch that it meets, and the point
+//! that it leaves counts for the class of its partner's length: places that see nearby surfaces
+//! (corners, crevices, the desk beneath a sheet of paper) are seen by short rays, the open parts of
+//! the same patch by long ones. Weighting by the partner and not by the ray itself keeps the
+//! classes' irradiances unbiased by the ray's own length. It costs no ray. Without classes the
+//! light that falls on the open part of a patch leaks into what the patch hides and is absorbed
+//! there; see [`Class::COUNT`] for what they save.
 //!
 //! Points both of whose rays meet the back of a one-sided face lie inside a solid (the floor under
 //! a box) and are dropped; a single back hit is black.
 //!
-//! Source: the two classes are luxel's own; ray-cast form factors after T. J. V. Malley, "A Shading
+//! Source: the classes are luxel's own; ray-cast form factors after T. J. V. Malley, "A Shading
 //! Method for Computer Generated Images", 1988. Cost: one ray per entry.
 
 use super::{Class, RadiosityConfig, unknown};
@@ -43,9 +44,9 @@ pub(super) struct CastRows {
 #[derive(Default)]
 struct Part {
     entries: Vec<u32>,
-    /// Of each patch: entries in the far row, in the near row, rays of the far row, of the near row.
-    counts: Vec<[u32; 4]>,
-    direct: Vec<[Irradiance; 2]>,
+    /// Of each class of each patch: entries of its row, and rays.
+    counts: Vec<[[u32; 2]; Class::COUNT]>,
+    direct: Vec<[Irradiance; Class::COUNT]>,
     buried_points: usize,
 }
 
@@ -67,36 +68,32 @@ pub(super) fn cast(world: &World, patches: &Patches, config: &RadiosityConfig) -
         })
         .collect();
     let mut entries = Vec::with_capacity(parts.iter().map(|part| part.entries.len()).sum());
-    let mut rows = Vec::with_capacity(2 * count);
-    let mut direct = Vec::with_capacity(2 * count);
-    let mut weights = Vec::with_capacity(2 * count);
+    let mut rows = Vec::with_capacity(Class::COUNT * count);
+    let mut direct = Vec::with_capacity(Class::COUNT * count);
+    let mut weights = Vec::with_capacity(Class::COUNT * count);
     let mut buried_points = 0;
     for part in parts {
         let mut first = entries.len();
-        for ([far, near, far_rays, near_rays], class_direct) in part.counts.iter().zip(&part.direct)
-        {
-            let middle = first + *far as usize;
-            let end = middle + *near as usize;
-            let all = Row {
+        for (counts, class_direct) in part.counts.iter().zip(&part.direct) {
+            let mut own = [Row {
                 first,
-                end,
-                rays: far_rays + near_rays,
-            };
-            // A class that no ray speaks for is the whole patch.
-            let or_all = |row: Row| if row.rays == 0 { all } else { row };
-            rows.push(or_all(Row {
-                first,
-                end: middle,
-                rays: *far_rays,
-            }));
-            rows.push(or_all(Row {
-                first: middle,
-                end,
-                rays: *near_rays,
-            }));
-            weights.extend([*far_rays, *near_rays]);
-            direct.extend(class_direct);
-            first = end;
+                end: first,
+                rays: 0,
+            }; Class::COUNT];
+            for (row, &[count, rays]) in own.iter_mut().zip(counts) {
+                *row = Row {
+                    first,
+                    end: first + count as usize,
+                    rays,
+                };
+                first = row.end;
+            }
+            weights.extend(own.iter().map(|row| row.rays));
+            for class in 0..Class::COUNT {
+                let stand_in = stand_in(&own, class);
+                rows.push(own[stand_in]);
+                direct.push(class_direct[stand_in]);
+            }
         }
         entries.extend(part.entries);
         buried_points += part.buried_points;
@@ -156,9 +153,9 @@ fn cast_part(
     );
     for (slot, patch) in ids.enumerate() {
         let size = patches.size(patch);
-        let mut lists: [Vec<u32>; 2] = [Vec::new(), Vec::new()];
-        let mut ray_counts = [0u32; 2];
-        let mut sums = [Rgb::ZERO; 2];
+        let mut lists: [Vec<u32>; Class::COUNT] = Default::default();
+        let mut ray_counts = [0u32; Class::COUNT];
+        let mut sums = [Rgb::ZERO; Class::COUNT];
         let range = slot * points..(slot + 1) * points;
         for (point, direct) in range.clone().zip(&direct[range]) {
             let pair = [2 * point, 2 * point + 1];
@@ -169,7 +166,7 @@ fn cast_part(
             }
             for (ray, met) in met.into_iter().enumerate() {
                 let partner = hits[pair[1 - ray]].t;
-                let class = usize::from(Class::at(partner, size) == Class::Near);
+                let class = Class::at(partner, size).index();
                 ray_counts[class] += 1;
                 sums[class] += direct.0;
                 match met {
@@ -179,25 +176,27 @@ fn cast_part(
                 }
             }
         }
-        let total = (sums[0] + sums[1]) / f64::from((ray_counts[0] + ray_counts[1]).max(1));
-        part.direct.push([0, 1].map(|class| {
-            Irradiance(if ray_counts[class] == 0 {
-                total
-            } else {
-                sums[class] / f64::from(ray_counts[class])
-            })
-        }));
-        part.counts.push([
-            lists[0].len() as u32,
-            lists[1].len() as u32,
-            ray_counts[0],
-            ray_counts[1],
-        ]);
+        let classes = Class::all().map(Class::index);
+        part.direct.push(
+            classes.map(|class| Irradiance(sums[class] / f64::from(ray_counts[class].max(1)))),
+        );
+        part.counts
+            .push(classes.map(|class| [lists[class].len() as u32, ray_counts[class]]));
         for list in lists {
             part.entries.extend(list);
         }
     }
     part
+}
+
+/// The class whose row stands in for one that no ray speaks for: the next farther one,
+/// else the next nearer one. Either order measured the same.
+fn stand_in(rows: &[Row; Class::COUNT], class: usize) -> usize {
+    let filled = |&other: &usize| rows[other].rays > 0;
+    let farther = (0..=class).rev().find(filled);
+    farther
+        .or_else(|| (class..Class::COUNT).find(filled))
+        .unwrap_or(class)
 }
 
 /// The unknown that a ray met, or the sky's share of E: π L of the direction that it left in.
