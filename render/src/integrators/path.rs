@@ -4,9 +4,10 @@
 //! (the next event) and one direction by the cosine; mirrors and glass continue in their own
 //! direction, chosen by chance with their share of the energy. From the `ROULETTE_FROM`-th bounce
 //! a path survives with a probability q ≤ `MAX_SURVIVAL` and is weighted by 1/q. Emission that
-//! the connections cover (the polygons of [`luxel_solver::direct::Lights`]) counts on a hit only
-//! where no connection could be made: from the camera and after a mirror or glass; every other
-//! emission and the sky are found by the paths themselves. The backs of one-sided faces are black.
+//! connections find too (the polygons of [`luxel_solver::direct::Lights`]) is shared out by the
+//! balance heuristic (multiple importance sampling) where a diffuse vertex could have connected to
+//! it, and counts in full from the camera and after a mirror or glass; every other emission and the
+//! sky are found by the paths themselves. The backs of one-sided faces are black.
 //!
 //! Source: J. T. Kajiya, "The rendering equation", SIGGRAPH 1986; J. Arvo, D. Kirk, "Particle
 //! transport and image synthesis", SIGGRAPH 1990 (roulette). Unbiased; variance falls as 1/n, or a
@@ -14,7 +15,7 @@
 //! Paths of a batch advance together, one ray batch and one shadow batch a bounce. Cost: two rays
 //! a bounce.
 
-use super::next_event::connect;
+use super::next_event::{connect, density, weight};
 use super::specular::{boundary, reflect};
 use super::vertex::Vertex;
 use super::{Integrator, SampleKey, background, unit_ray};
@@ -55,8 +56,9 @@ struct Path {
     sequence: Sequence,
     index: u32,
     bounce: u32,
-    /// Whether the emission of a source counts when the ray meets it.
-    sees_sources: bool,
+    /// The diffuse vertex that the ray leaves, whose connections may find a source as well; `None`
+    /// for the camera, mirrors and glass.
+    connected_from: Option<Receiver>,
 }
 
 /// A connection to a light, not yet tested for blockers.
@@ -155,7 +157,7 @@ impl<'w> PathTracer<'w> {
                 sequence: Sequence::new(self.seed, Stage::PATH, item),
                 index,
                 bounce: 0,
-                sees_sources: false,
+                connected_from: Some(*receiver),
             };
             let numbers = Numbers::draw(&path);
             if components != Components::Indirect {
@@ -205,9 +207,9 @@ impl<'w> PathTracer<'w> {
                 }
                 continue;
             };
-            let is_source = self.world.lights().is_source(vertex.interaction.face);
-            if emission && (path.sees_sources || !is_source) {
-                *sum += path.throughput * vertex.emission().0;
+            let emitted = vertex.emission().0;
+            if emission && emitted != Rgb::ZERO {
+                *sum += path.throughput * emitted * self.path_share(path, &vertex);
             }
             if scatter {
                 self.scatter(wave, path, &vertex);
@@ -217,6 +219,20 @@ impl<'w> PathTracer<'w> {
         wave.paths = paths;
         std::mem::swap(&mut wave.paths, &mut wave.next);
         self.resolve(wave, sums);
+    }
+
+    /// The share of a vertex's emission that belongs to the path which met it, not to the connections
+    /// of the vertex before.
+    fn path_share(&self, path: &Path, vertex: &Vertex<'_>) -> f64 {
+        let lights = self.world.lights();
+        let interaction = &vertex.interaction;
+        let source = lights.source_of(interaction.face, interaction.side);
+        let (Some(receiver), Some(source)) = (&path.connected_from, source) else {
+            return 1.0;
+        };
+        let direction = path.ray.direction.as_dvec3();
+        let density = density(self.world, receiver, source, direction);
+        1.0 - weight(receiver, direction, density)
     }
 
     /// Casts the pending connections and adds the light of those that nothing blocks.
@@ -253,20 +269,20 @@ impl<'w> PathTracer<'w> {
             return;
         }
         let diffuse_share = diffuse_weight / total;
-        let (direction, weight, sees_sources) = if numbers.lobe < diffuse_share {
+        let (direction, weight, connected_from) = if numbers.lobe < diffuse_share {
             let direction = cosine_direction(vertex.shading_normal, numbers.direction);
             if direction.dot(vertex.normal()) <= 0.0 {
                 // Below the face, which only a shading normal can ask for: blocked by the face.
                 return;
             }
-            (direction, albedo / diffuse_share, false)
+            (direction, albedo / diffuse_share, Some(vertex.receiver()))
         } else {
             // What is left of the number chooses between reflection and refraction.
             let choice = (numbers.lobe - diffuse_share) / (1.0 - diffuse_share);
             let Some((direction, weight)) = scatter_specular(vertex, specular, choice) else {
                 return;
             };
-            (direction, weight / (1.0 - diffuse_share), true)
+            (direction, weight / (1.0 - diffuse_share), None)
         };
         let mut throughput = path.throughput * weight;
         if path.bounce >= ROULETTE_FROM {
@@ -284,7 +300,7 @@ impl<'w> PathTracer<'w> {
                 sequence: path.sequence,
                 index: path.index,
                 bounce: path.bounce + 1,
-                sees_sources,
+                connected_from,
             });
         }
     }
@@ -309,7 +325,11 @@ impl<'w> PathTracer<'w> {
         ) else {
             return;
         };
-        let reflected = luxel_scenes::Radiosity(albedo * connection.irradiance).to_radiance();
+        let share = connection.density.map_or(1.0, |(direction, density)| {
+            weight(receiver, direction, density)
+        });
+        let irradiance = connection.irradiance * share;
+        let reflected = luxel_scenes::Radiosity(albedo * irradiance).to_radiance();
         wave.shadow_rays.push(connection.ray);
         wave.pending.push(Pending {
             slot: path.slot,
@@ -330,7 +350,7 @@ impl Integrator for PathTracer<'_> {
             sequence: Sequence::new(self.seed, Stage::PATH, key.item),
             index: key.index,
             bounce: 0,
-            sees_sources: true,
+            connected_from: None,
         }));
         self.run(&mut wave, values);
     }

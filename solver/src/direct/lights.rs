@@ -2,6 +2,7 @@
 
 use crate::form_factors::point_to_polygon;
 use crate::geometry::Geometry;
+use crate::patches::Side;
 use crate::surface::Surfaces;
 use glam::DVec3;
 use luxel_scenes::{FaceId, LightKind, Radiance, Rgb, Sidedness};
@@ -85,8 +86,8 @@ impl Source {
 /// Every source of a scene.
 pub struct Lights {
     sources: Vec<Source>,
-    /// True for faces whose emission is a source here: rays that meet them must not count it again.
-    is_source: Vec<bool>,
+    /// The source that the front of each face belongs to, if any.
+    front_source: Vec<Option<u32>>,
     sky: Option<SkyDome>,
     are_found_by_rays: bool,
 }
@@ -109,20 +110,24 @@ impl Lights {
             polygons.sort_by(|a, b| b.flux.total_cmp(&a.flux));
             polygons.truncate(MAX_POLYGONS);
         }
-        let mut is_source = vec![false; scene.faces.len()];
+        let mut front_source = vec![None; scene.faces.len()];
         let mut sources = Vec::new();
         for polygon in polygons {
-            for face in polygon.faces {
-                is_source[face.index()] = true;
-            }
             let EmissivePolygon {
                 corners,
                 radiance,
                 normal,
                 extent,
+                two_sided,
+                faces,
                 ..
             } = polygon;
-            if polygon.two_sided {
+            // The back of a two-sided polygon comes just before its front.
+            let front = sources.len() as u32 + u32::from(two_sided);
+            for face in faces {
+                front_source[face.index()] = Some(front);
+            }
+            if two_sided {
                 let reversed = corners.iter().rev().copied().collect();
                 sources.push(Source::Polygon {
                     shape: Luminaire::new(reversed),
@@ -178,12 +183,12 @@ impl Lights {
         }
         let sky = SkyDome::new(scene);
         let are_found_by_rays = sky.is_some()
-            || scene
-                .face_ids()
-                .any(|face| surfaces.material(face).is_emissive() && !is_source[face.index()]);
+            || scene.face_ids().any(|face| {
+                surfaces.material(face).is_emissive() && front_source[face.index()].is_none()
+            });
         Self {
             sources,
-            is_source,
+            front_source,
             sky,
             are_found_by_rays,
         }
@@ -194,9 +199,19 @@ impl Lights {
         &self.sources
     }
 
-    /// Whether the emission of a face is a source here.
+    /// Whether the emission of a face is a source here: rays that meet it must not count it again.
     pub fn is_source(&self, face: FaceId) -> bool {
-        self.is_source[face.index()]
+        self.front_source[face.index()].is_some()
+    }
+
+    /// The index in [`Self::sources`] of what a side of a face emits. Only for sides that emit.
+    pub fn source_of(&self, face: FaceId, side: Side) -> Option<usize> {
+        let front = self.front_source[face.index()]? as usize;
+        Some(if side == Side::Front {
+            front
+        } else {
+            front - 1
+        })
     }
 
     /// Radiance from outside the scene, from the direction that a ray travels to; zero without sky.
