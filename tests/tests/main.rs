@@ -1,5 +1,6 @@
 //! The integration tests of luxel, one module per subject.
 
+mod agreement;
 mod ambient_occlusion;
 mod bad_input;
 mod determinism;
@@ -7,5 +8,6 @@ mod enclosures;
 mod form_factors;
 mod hemicube;
 mod irradiance_fields;
+mod references;
 mod sampling;
 mod stress_rays;
