@@ -110,6 +110,11 @@ impl CameraFrame {
         self.size
     }
 
+    /// Where all rays start, in metres; `None` for parallel rays.
+    pub fn eye(&self) -> Option<DVec3> {
+        self.perspective.then_some(self.position)
+    }
+
     /// The ray through raster position `raster` (pixels, from the upper left corner).
     pub fn ray(&self, raster: DVec2) -> CameraRay {
         let x = 2.0 * raster.x / self.size[0] as f64 - 1.0;

@@ -25,7 +25,7 @@ use luxel_solver::world::World;
 
 /// A camera ray in the unit frame. An eye far outside the scene is moved along its ray to where the
 /// scene's surroundings begin, so that f32 holds its position.
-fn unit_ray(world: &World<'_>, ray: &CameraRay) -> Ray {
+pub(crate) fn unit_ray(world: &World<'_>, ray: &CameraRay) -> Ray {
     /// Radius of a ball about the frame's origin that holds the scene: √3/2, rounded up.
     const RADIUS: f64 = 0.9;
     let origin = world.surfaces().geometry().frame().to_unit(ray.origin);

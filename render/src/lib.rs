@@ -25,3 +25,4 @@ pub mod points;
 pub mod progress;
 pub mod solution;
 pub mod tone_map;
+pub mod view;

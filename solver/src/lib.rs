@@ -25,3 +25,5 @@ pub mod world;
 pub mod radiosity;
 
 pub mod gather;
+
+pub mod audit;

@@ -16,8 +16,10 @@ use crate::integrators::radiosity::RadiosityView;
 use crate::integrators::whitted::{self, Highlight, Whitted};
 use crate::integrators::{Integrator, Samples, expose};
 use crate::tone_map::ToneMap;
+use crate::view::view;
 use clap::ValueEnum;
 use luxel_scenes::{Irradiance, Rgb};
+use luxel_solver::audit;
 use luxel_solver::world::World;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -120,6 +122,7 @@ impl Render {
             if self.integrator != Method::Ao {
                 scene::require_light(&world)?;
             }
+            self.judge_view(&world, &camera.name, &frame, &session.context)?;
             self.expose(&world, &frame, samples, &session.context)
         })??;
 
@@ -155,6 +158,25 @@ impl Render {
         }
         self.report(&frame, samples, noise, started, session)?;
         Ok(ExitCode::Ok)
+    }
+
+    /// Refuses a camera that sees nothing but backs, which are black; warns of one that sees mostly
+    /// backs. Ambient occlusion shows backs, too.
+    fn judge_view(
+        &self,
+        world: &World<'_>,
+        camera: &str,
+        frame: &CameraFrame,
+        context: &Context<'_>,
+    ) -> Result<(), Failure> {
+        let Some(finding) = audit::inside_view(world, &view(world, camera, frame)) else {
+            return Ok(());
+        };
+        if finding.is_total() && self.integrator != Method::Ao {
+            return Err(Failure::new(ExitCode::InvalidInput, finding.to_string()));
+        }
+        context.reporter.warning(finding);
+        Ok(())
     }
 
     fn expose(

@@ -6,6 +6,7 @@ use std::fs;
 use std::path::PathBuf;
 
 mod results;
+mod views;
 
 /// Runs the command and returns exit code, stdout and stderr.
 fn luxel(args: &[&str]) -> (ExitCode, String, String) {

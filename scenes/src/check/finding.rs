@@ -26,7 +26,8 @@ pub struct FaceRef {
 }
 
 impl FaceRef {
-    pub(super) fn new(scene: &Scene, face: FaceId) -> Self {
+    /// Names a face of `scene`.
+    pub fn new(scene: &Scene, face: FaceId) -> Self {
         let object = scene.faces[face.index()].object;
         let before = &scene.faces[..=face.index()];
         Self {

@@ -34,4 +34,6 @@ impl Stage {
     pub const BVH: Self = Self(12);
     /// Points in patches.
     pub const PATCHES: Self = Self(13);
+    /// Points, eyes and lights that look for backs of faces.
+    pub const AUDIT: Self = Self(15);
 }
