@@ -62,6 +62,15 @@ pub(super) struct Probe {
     #[arg(long, value_name = "D", value_parser = super::parse_length)]
     max_distance: Option<f64>,
 
+    /// With --max-distance: how nearer blockers count
+    #[arg(
+        long,
+        value_name = "HOW",
+        requires = "max_distance",
+        default_value = "sharp"
+    )]
+    falloff: Falloff,
+
     /// Rays for each point [default: 1024; path and ao: 4096]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=1 << 28))]
     rays: Option<u32>,
@@ -190,7 +199,7 @@ impl Probe {
             let config = Config {
                 rays: each(4096),
                 max_distance: self.max_distance,
-                falloff: Falloff::Sharp,
+                falloff: self.falloff,
                 seed,
             };
             let occlusion = AmbientOcclusion::new(world, config);

@@ -72,6 +72,15 @@ pub(super) struct Render {
     /// With --integrator ao: metres beyond which nothing occludes
     #[arg(long, value_name = "D", value_parser = super::parse_length)]
     max_distance: Option<f64>,
+
+    /// With --max-distance: how nearer blockers count
+    #[arg(
+        long,
+        value_name = "HOW",
+        requires = "max_distance",
+        default_value = "sharp"
+    )]
+    falloff: Falloff,
 }
 
 /// How light is computed.
@@ -200,7 +209,7 @@ impl Render {
                 ao::Config {
                     rays: AO_RAYS,
                     max_distance: self.max_distance,
-                    falloff: Falloff::Sharp,
+                    falloff: self.falloff,
                     seed,
                 },
             )),

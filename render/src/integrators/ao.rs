@@ -19,11 +19,11 @@ use luxel_solver::world::{Receiver, World};
 use rayon::prelude::*;
 
 /// How a blocker counts that is nearer than the maximum distance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Falloff {
-    /// Fully.
+    /// Fully
     Sharp,
-    /// By 1 − (t/d)² at distance t of d.
+    /// By 1 − (t/d)² at distance t of d
     Smooth,
 }
 
