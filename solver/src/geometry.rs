@@ -188,20 +188,44 @@ impl Geometry {
     }
 }
 
-/// A bound on the distance between an f32 ray origin made from coordinates of size |p| on a face
-/// of extent s (both in units) and the plane that the watertight triangle test sees:
-/// `γ₇ |p|` for the interpolated position (pbrt §6.8) plus `6ε s` for the distance that the test
-/// computes from vertices relative to the origin; ε = 2⁻²⁴. At most 5.7e-7 in the unit frame.
+/// Unit roundoff of f32, u = 2⁻²⁴.
+const ROUNDOFF: f64 = 1.0 / 16_777_216.0;
+
+/// Least step off a surface: decides for planes through the frame's middle, where f32 is exact.
+const LEAST_STEP: f64 = 1e-12;
+
+/// A bound on the step that [`ray_origin`] takes from a face of extent s, in any direction.
 pub fn offset_bound(position: DVec3, extent: f64) -> f64 {
-    const EPSILON: f64 = 1.0 / 16_777_216.0;
-    EPSILON * (7.0 * position.abs().max_element() + 6.0 * extent)
+    ROUNDOFF * (7.0 * position.abs().max_element() + 6.0 * extent)
+}
+
+/// A bound on the distance, along the unit normal n, between `position` rounded to f32 and the plane
+/// that rays see, whose corners are rounded too: 2u Σ |nᵢ| vᵢ, where no corner's coordinate i is
+/// larger than vᵢ = |pᵢ| + √3 s √(1 − nᵢ²) on a face of extent s. Rays compute distances to that
+/// plane in f64, which adds nothing. Zero across an axis-aligned plane through the middle, at most
+/// 5e-7 in the unit frame.
+fn plane_rounding(position: DVec3, normal: DVec3, extent: f64) -> f64 {
+    let tilt = (DVec3::ONE - normal * normal)
+        .max(DVec3::ZERO)
+        .map(f64::sqrt);
+    let reach = position.abs() + tilt * (3f64.sqrt() * extent);
+    2.0 * ROUNDOFF * normal.abs().dot(reach)
 }
 
 /// The f32 origin of rays that leave `position` (on a face of the given `extent`) to the side of
-/// `normal`: moved off by [`offset_bound`], so that the face itself cannot be hit again.
+/// `normal`: moved off by twice the bound on rounding, so that the face itself cannot be hit again.
 pub fn ray_origin(position: DVec3, normal: DVec3, extent: f64) -> Vec3 {
-    // √3: the bound holds per coordinate, the step is taken along the normal.
-    let step = offset_bound(position, extent) * 3f64.sqrt();
+    let step = 2.0 * plane_rounding(position, normal, extent) + LEAST_STEP;
+    (position + normal * step).as_vec3()
+}
+
+/// The f32 end of a segment from `origin` to `position` on a face of the given `extent`: moved off
+/// the face as an origin is, and by the rounding of the segment's direction besides.
+pub fn ray_target(position: DVec3, normal: DVec3, extent: f64, origin: Vec3) -> Vec3 {
+    let length = position.abs() + origin.as_dvec3().abs();
+    let step = 2.0 * plane_rounding(position, normal, extent)
+        + 4.0 * ROUNDOFF * normal.abs().dot(length)
+        + LEAST_STEP;
     (position + normal * step).as_vec3()
 }
 

@@ -8,6 +8,7 @@ mod enclosures;
 mod form_factors;
 mod hemicube;
 mod irradiance_fields;
+mod ray_cast;
 mod references;
 mod sampling;
 mod stress_rays;

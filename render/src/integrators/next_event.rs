@@ -16,7 +16,7 @@ use glam::DVec3;
 use luxel_scenes::Rgb;
 use luxel_solver::bvh::Ray;
 use luxel_solver::direct::Source;
-use luxel_solver::geometry::ray_origin;
+use luxel_solver::geometry::ray_target;
 use luxel_solver::sampling::ProjectedSphericalTriangle;
 use luxel_solver::world::{Receiver, World};
 use std::f64::consts::PI;
@@ -136,7 +136,8 @@ pub(super) fn connect(
             let cosine = direction.dot(receiver.normal);
             // Points of a polygon behind its own plane send nothing: the exact E_i is zero there,
             // so that such a source is never chosen.
-            let ray = Ray::segment(receiver.origin, ray_origin(point, *normal, *extent));
+            let target = ray_target(point, *normal, *extent, receiver.origin);
+            let ray = Ray::segment(receiver.origin, target);
             let irradiance = radiance.0 * (cosine.max(0.0) / pdf);
             (ray, direction, irradiance, Some((direction, pdf * share)))
         }

@@ -28,7 +28,7 @@ impl Ray {
     }
 
     /// The open segment from `origin` to `target`. A target on a surface should be moved off it by
-    /// the rounding bound ([`crate::geometry::ray_origin`]), as the origin is.
+    /// the rounding bound ([`crate::geometry::ray_target`]), as the origin is.
     pub fn segment(origin: Vec3, target: Vec3) -> Self {
         Self {
             origin,

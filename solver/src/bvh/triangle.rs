@@ -6,10 +6,10 @@
 //! Where a function is zero in f32 it is computed again in f64, which is exact for products of
 //! f32.
 //!
-//! The distance from the edge functions is off by about ε s²/h on a triangle of extent s and height
-//! h, relative to its neighbourhood of size s: rays would hit a sliver that they leave. The distance
-//! to slivers is computed again in f64 from the corners, whose plane holds at every point between
-//! them however narrow the triangle is.
+//! The distance that follows from the edge functions is off by about ε s on a triangle of extent s,
+//! and by more on slivers: rays would hit the triangle that they leave. The distance of the few
+//! lanes that are inside is therefore that to the plane of the corners, in f64: exact but for its
+//! last rounding.
 //!
 //! Source: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", Journal of
 //! Computer Graphics Techniques 2(1), 2013. Valid for finite coordinates and a direction that is
@@ -36,11 +36,6 @@ pub(super) struct Shear {
     /// The direction in the order of `axes`.
     direction: [f32; 3],
 }
-
-/// Squared extent over twice the area, both seen along the ray's longest axis, from which a
-/// triangle counts as a sliver. At 20 and more the error of the distance reaches the offset of
-/// ray origins; smaller values cost time for nothing.
-const SLIVER: f32 = 8.0;
 
 impl Shear {
     pub(super) fn new(ray: &Ray) -> Self {
@@ -132,16 +127,9 @@ pub(super) fn intersect(block: &Block, shear: &Shear, tmin: f32, tmax: f32) -> B
         let [a, b, c] = [edge[0][lane], edge[1][lane], edge[2][lane]];
         let determinant = a + b + c;
         let inverse = 1.0 / determinant;
-        let extent = |p: &[[f32; BLOCK]; 3]| {
-            let [a, b, c] = [p[0][lane], p[1][lane], p[2][lane]];
-            a.max(b).max(c) - a.min(b).min(c)
-        };
-        let side = extent(&x).max(extent(&y));
-        let mut t = (a * z[0][lane] + b * z[1][lane] + c * z[2][lane]) * inverse;
-        if side * side > SLIVER * determinant.abs() {
-            // A ray in the plane keeps the first value: it must not slip between two triangles.
-            t = plane_distance(block, shear, lane).unwrap_or(t);
-        }
+        // A ray in the plane takes the first-order value: it must not slip between two triangles.
+        let t = plane_distance(block, shear, lane)
+            .unwrap_or_else(|| (a * z[0][lane] + b * z[1][lane] + c * z[2][lane]) * inverse);
         if (t >= tmin) & (t <= tmax) {
             hit.t[lane] = t;
             hit.u[lane] = b * inverse;
@@ -153,7 +141,7 @@ pub(super) fn intersect(block: &Block, shear: &Shear, tmin: f32, tmax: f32) -> B
 
 /// Distance to the plane of a triangle in lengths of the ray's direction, computed in f64; `None`
 /// for a ray in the plane.
-#[cold]
+#[inline]
 fn plane_distance(block: &Block, shear: &Shear, lane: usize) -> Option<f32> {
     let relative = |corner: usize| {
         let component = |k: usize| {

@@ -10,7 +10,7 @@
 
 use super::lights::{Lights, Source};
 use crate::bvh::{Bvh, Ray};
-use crate::geometry::ray_origin;
+use crate::geometry::ray_target;
 use crate::sampling::Sequence;
 use glam::{DVec3, Vec3};
 use luxel_scenes::{Irradiance, Rgb};
@@ -248,13 +248,8 @@ impl<'a> DirectSampler<'a> {
                         })
                 };
                 // Without solid angle in f64 there is no irradiance beyond rounding either.
-                // The rounding of an origin far outside the scene counts as well.
-                let reach = f64::from(sample.origin.abs().max_element());
-                ray_origin(
-                    point.unwrap_or(shape.corners()[0]),
-                    *normal,
-                    extent.max(reach),
-                )
+                let point = point.unwrap_or(shape.corners()[0]);
+                ray_target(point, *normal, *extent, sample.origin)
             }
             Source::Point { position, .. } => position.as_vec3(),
             Source::Directional { towards, .. } => {

@@ -41,7 +41,7 @@ pub use occluded::{AnalyticConfig, AnalyticFactors, Exchange, analytic, occluded
 pub use point_to_polygon::point_to_polygon;
 pub use polygon::{Polygon, PolygonError};
 pub use polygon_to_polygon::{exchange_area, polygon_to_polygon};
-pub use ray_cast::{REPLICATES, RayCastConfig, RayCastFactors, ray_cast};
+pub use ray_cast::{REPLICATES, RayCastConfig, RayCastFactors, ray_cast, ray_cast_row};
 pub use repair::{Repair, RepairError, Target, repair};
 pub use report::{Closure, closure, reciprocity_defect, reciprocity_defect_of_largest};
 pub use scene::{analytic_factors, hemicube_factors};

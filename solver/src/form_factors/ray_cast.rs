@@ -50,7 +50,7 @@ pub fn ray_cast(world: &World, patches: &Patches, config: &RayCastConfig) -> Ray
     let len = patches.len();
     let rows: Vec<(Vec<f64>, Vec<f64>)> = (0..len)
         .into_par_iter()
-        .map(|i| row(world, patches, PatchId::new(i), config))
+        .map(|i| ray_cast_row(world, patches, PatchId::new(i), config))
         .collect();
     let mut factors = Vec::with_capacity(len * len);
     let mut standard_error = Vec::with_capacity(len * len);
@@ -65,39 +65,25 @@ pub fn ray_cast(world: &World, patches: &Patches, config: &RayCastConfig) -> Ray
     }
 }
 
-fn row(
+/// One row of [`ray_cast`]: the form factors from `patch` to each patch, and their standard errors.
+pub fn ray_cast_row(
     world: &World,
     patches: &Patches,
     patch: PatchId,
     config: &RayCastConfig,
 ) -> (Vec<f64>, Vec<f64>) {
     let per_replicate = (config.rays as u64).div_ceil(REPLICATES).max(1) as u32;
+    let counts: Vec<Vec<u32>> = (0..REPLICATES)
+        .into_par_iter()
+        .map(|replicate| {
+            let item = (replicate << 32) | u64::from(patch.0);
+            let sequence = Sequence::new(config.seed, Stage::FORM_FACTORS, item);
+            count_hits(world, patches, patch, sequence, per_replicate)
+        })
+        .collect();
     let mut sum = vec![0.0; patches.len()];
     let mut square = vec![0.0; patches.len()];
-    let mut counts = vec![0u32; patches.len()];
-    let mut rays = Vec::with_capacity(BATCH as usize);
-    let mut hits = Vec::new();
-    for replicate in 0..REPLICATES {
-        let item = (replicate << 32) | u64::from(patch.0);
-        let sequence = Sequence::new(config.seed, Stage::FORM_FACTORS, item);
-        counts.fill(0);
-        for first in (0..per_replicate).step_by(BATCH as usize) {
-            rays.clear();
-            for index in first..per_replicate.min(first + BATCH) {
-                let [x, y, u, v] = sequence.point4(index);
-                let point = patches.sample(world.surfaces().geometry(), patch, [x, y]);
-                let frame = sampling::Frame::around(point.normal.as_vec3());
-                let local = cosine_hemisphere::sample([u as f32, v as f32]);
-                rays.push(Ray::new(point.origin, frame.to_world(local)));
-            }
-            hits.resize(rays.len(), Hit::MISS);
-            world.bvh().closest_hits(&rays, &mut hits);
-            for (ray, hit) in rays.iter().zip(&hits) {
-                if let Some(met) = world.patch_hit(patches, ray, hit) {
-                    counts[met.index()] += 1;
-                }
-            }
-        }
+    for counts in &counts {
         for (j, &count) in counts.iter().enumerate() {
             let fraction = f64::from(count) / f64::from(per_replicate);
             sum[j] += fraction;
@@ -112,4 +98,35 @@ fn row(
         .map(|(mean, square)| ((square / n - mean * mean).max(0.0) / (n - 1.0)).sqrt())
         .collect();
     (mean, error)
+}
+
+/// How many of the first `rays` rays of a sequence from a patch meet each patch.
+fn count_hits(
+    world: &World,
+    patches: &Patches,
+    patch: PatchId,
+    sequence: Sequence,
+    rays: u32,
+) -> Vec<u32> {
+    let mut counts = vec![0; patches.len()];
+    let mut batch = Vec::with_capacity(BATCH as usize);
+    let mut hits = Vec::new();
+    for first in (0..rays).step_by(BATCH as usize) {
+        batch.clear();
+        for index in first..rays.min(first + BATCH) {
+            let [x, y, u, v] = sequence.point4(index);
+            let point = patches.sample(world.surfaces().geometry(), patch, [x, y]);
+            let frame = sampling::Frame::around(point.normal.as_vec3());
+            let local = cosine_hemisphere::sample([u as f32, v as f32]);
+            batch.push(Ray::new(point.origin, frame.to_world(local)));
+        }
+        hits.resize(batch.len(), Hit::MISS);
+        world.bvh().closest_hits(&batch, &mut hits);
+        for (ray, hit) in batch.iter().zip(&hits) {
+            if let Some(met) = world.patch_hit(patches, ray, hit) {
+                counts[met.index()] += 1;
+            }
+        }
+    }
+    counts
 }

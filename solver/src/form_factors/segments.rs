@@ -12,7 +12,7 @@ use super::occluded::AnalyticConfig;
 use super::polygon::Polygon;
 use super::ray_cast::REPLICATES;
 use crate::bvh::{Hit, Ray};
-use crate::geometry::{offset_bound, ray_origin};
+use crate::geometry::{offset_bound, ray_origin, ray_target};
 use crate::sampling::{self, Sequence, Stage};
 use crate::world::World;
 use glam::DVec3;
@@ -57,6 +57,11 @@ impl<'a> Sampled<'a> {
     fn leave(&self, point: DVec3) -> glam::Vec3 {
         ray_origin(point, self.polygon.normal(), self.extent)
     }
+
+    /// The end of a segment to a point of it.
+    fn end(&self, point: DVec3, origin: glam::Vec3) -> glam::Vec3 {
+        ray_target(point, self.polygon.normal(), self.extent, origin)
+    }
 }
 
 /// The visible share of the exchange between two polygons in the unit frame, and its standard error.
@@ -81,7 +86,8 @@ pub(super) fn visible_share(
         for index in 0..per_replicate {
             let [x, y, u, v] = sequence.point4(index);
             let (from, to) = (p.point([x, y]), q.point([u, v]));
-            rays.push(Ray::segment(p.leave(from), q.leave(to)));
+            let origin = p.leave(from);
+            rays.push(Ray::segment(origin, q.end(to, origin)));
             weights.push(kernel(from, p.polygon.normal(), to, q.polygon.normal()));
         }
     }
