@@ -11,6 +11,7 @@ pub mod command;
 pub mod golden;
 pub mod hypothesis;
 pub mod metrics;
+pub mod picture;
 pub mod probe;
 pub mod references;
 pub mod scene_files;

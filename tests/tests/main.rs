@@ -11,4 +11,5 @@ mod irradiance_fields;
 mod ray_cast;
 mod references;
 mod sampling;
+mod specular;
 mod stress_rays;

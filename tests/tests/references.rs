@@ -3,9 +3,9 @@
 use luxel_scenes::Rgb;
 use luxel_tests::command::{arg, luxel};
 use luxel_tests::metrics::Errors;
+use luxel_tests::picture::example;
 use luxel_tests::probe::estimates;
 use luxel_tests::references::IrradianceReference;
-use std::path::Path;
 
 /// Runs the probe on a reference scene and compares with its reference; also the root mean square of
 /// the stated standard errors over the mean.
@@ -14,8 +14,7 @@ fn probe(scene: &str, options: &[&str]) -> (Errors, f64) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let [points, out] = ["points.csv", "out.csv"].map(|name| folder.path().join(name));
     std::fs::write(&points, reference.points_csv()).expect("a table of points");
-    let file =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../scenes/data/{scene}/{scene}.toml"));
+    let file = example(scene);
     let mut args = vec![
         "probe",
         arg(&file),
