@@ -6,6 +6,7 @@ mod bad_input;
 mod determinism;
 mod enclosures;
 mod form_factors;
+mod golden;
 mod hemicube;
 mod irradiance_fields;
 mod ray_cast;
