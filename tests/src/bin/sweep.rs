@@ -1,164 +1,178 @@
-//! Prints error against time of the final gather on the reference scenes, for a sweep of patches
-//! n, rays a row K and gather rays M.
+//! Prints, as Markdown tables, the error and the time of the final gather at the points of the
+//! reference scenes, for a sweep of its budgets: patches n, rays K of a row in each of four
+//! solutions, gather rays M and shadow rays S of a point. Where the defaults of the command come
+//! from, and where a change of the gather shows first.
 //!
-//! Usage: `cargo run --release -p luxel-tests --bin sweep -- [SCENE ...]`
+//! Usage: `cargo run --release -p luxel-tests --bin sweep -- [SCENE] [n,K,M ...]`: all scenes with
+//! budgets of their own, one scene, or one scene with the given budgets.
+//!
+//! Errors are those of [`luxel_tests::metrics`], the reference's own variance subtracted; `stated`
+//! is the root mean square of the standard errors that the gather states, over the mean: what of the
+//! error is noise. Times are of this machine, now.
 
-use glam::DVec3;
-use luxel_scenes::{Irradiance, Rgb};
+use luxel_scenes::Rgb;
 use luxel_solver::gather::{Components, GatherConfig, Key, gather};
 use luxel_solver::patches::PatchSize;
 use luxel_solver::radiosity::{RadiosityConfig, solve};
 use luxel_solver::solvers::{Config, Tolerance};
 use luxel_solver::world::World;
-use serde::Deserialize;
-use std::path::Path;
+use luxel_tests::metrics::Errors;
+use luxel_tests::picture::example;
+use luxel_tests::references::IrradianceReference;
 use std::time::Instant;
 
-#[derive(Deserialize)]
-struct Reference {
-    #[serde(rename = "E")]
-    irradiance: Vec<[f64; 3]>,
-    #[serde(alias = "uncertainty")]
-    stderr: Vec<[f64; 3]>,
-    #[serde(rename = "E_direct")]
-    direct: Vec<[f64; 3]>,
-    position: Vec<[f64; 3]>,
-    normal: Vec<[f64; 3]>,
+/// Independent solutions and sets of gather rays, as in the command.
+const REPLICATES: usize = 4;
+
+/// What is spent.
+#[derive(Clone, Copy)]
+struct Budget {
+    patches: usize,
+    row_rays: usize,
+    rays: usize,
 }
 
-fn main() {
-    let wanted: Vec<String> = std::env::args().skip(1).collect();
-    for (name, sweep) in [
-        ("furnace", &[(200, 32, 64), (1000, 64, 256)][..]),
-        (
-            "cornell",
-            &[
-                (172, 32, 32),
-                (820, 32, 128),
-                (1461, 64, 448),
-                (2977, 64, 1024),
-                (3000, 256, 4096),
-            ],
-        ),
-        ("corridor", &[(1003, 64, 64), (1003, 64, 448)]),
-        ("office", &[(2335, 64, 64), (2418, 64, 1024)]),
-    ] {
-        if wanted.is_empty() || wanted.iter().any(|w| w == name) {
-            run(name, sweep);
-        }
+const fn budget(patches: usize, row_rays: usize, rays: usize) -> Budget {
+    Budget {
+        patches,
+        row_rays,
+        rays,
     }
 }
 
-fn run(name: &str, sweep: &[(usize, usize, usize)]) {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let file = root.join(format!("references/{name}/irradiance.json"));
-    let reference: Reference =
-        serde_json::from_slice(&std::fs::read(&file).expect("reference is readable"))
-            .expect("valid");
-    let path = root.join(format!("../scenes/data/{name}/{name}.toml"));
-    let positions: Vec<DVec3> = reference.position.iter().map(|&p| p.into()).collect();
-    let normals: Vec<DVec3> = reference.normal.iter().map(|&p| p.into()).collect();
-    let keys: Vec<Key> = (0..positions.len() as u64).map(Key::of).collect();
+/// Rising budgets for each scene; the one before the last is the command's default.
+const SWEEPS: [(&str, &[Budget]); 4] = [
+    ("furnace", &[budget(200, 8, 64), budget(1000, 16, 256)]),
+    (
+        "cornell",
+        &[
+            budget(800, 16, 64),
+            budget(1500, 16, 256),
+            budget(6000, 32, 1024),
+            budget(16_000, 32, 8192),
+        ],
+    ),
+    (
+        "corridor",
+        &[
+            budget(1000, 32, 64),
+            budget(2500, 32, 256),
+            budget(6000, 32, 1024),
+            budget(16_000, 32, 8192),
+        ],
+    ),
+    (
+        "office",
+        &[
+            budget(1500, 32, 64),
+            budget(2500, 32, 256),
+            budget(6000, 32, 1024),
+            budget(16_000, 32, 8192),
+        ],
+    ),
+];
+
+fn main() -> Result<(), String> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let Some((wanted, budgets)) = arguments.split_first() else {
+        for (scene, budgets) in SWEEPS {
+            sweep(scene, budgets);
+        }
+        return Ok(());
+    };
+    let known = SWEEPS.iter().find(|(scene, _)| scene == wanted);
+    let (scene, own) = known.ok_or_else(|| format!("there is no scene {wanted:?}"))?;
+    let given = budgets
+        .iter()
+        .map(|text| parse(text).ok_or_else(|| format!("{text:?} is not n,K,M")))
+        .collect::<Result<Vec<Budget>, String>>()?;
+    sweep(scene, if given.is_empty() { own } else { &given });
+    Ok(())
+}
+
+fn parse(text: &str) -> Option<Budget> {
+    let numbers: Vec<usize> = text
+        .split(',')
+        .map(|n| n.parse().ok())
+        .collect::<Option<_>>()?;
+    match numbers[..] {
+        [patches, row_rays, rays] => Some(budget(patches, row_rays, rays)),
+        _ => None,
+    }
+}
+
+/// Prints the table of a scene.
+fn sweep(scene: &str, budgets: &[Budget]) {
+    println!("\n{scene}\n");
     println!(
-        "{name}:     n     K     M    S | load   mesh  solve gather  total s | nRMSE %  relRMSE %  bias %  direct nRMSE %, bias % | stated SE %"
+        "| n | K | M | S | nRMSE % | relRMSE % | bias % | stated % | load s | mesh s | solve s | gather s |"
     );
-    for &(n, k, m) in sweep {
-        let start = Instant::now();
-        let scene = luxel_scenes::load(&path).expect("scene loads").scene;
-        let world = World::new(&scene);
-        let loaded = start.elapsed().as_secs_f64();
-        let patches = world.mesh(PatchSize::Count(n)).expect("meshes");
-        let meshed = start.elapsed().as_secs_f64();
-        let replicates = 4;
-        let shadow = (3 * m / 4).clamp(16, 1024);
-        let solutions: Vec<_> = (0..replicates)
-            .map(|replicate| {
-                let config = RadiosityConfig {
-                    rays: k / replicates,
-                    shadow_rays: 1,
-                    solver: Config {
-                        tolerance: Tolerance::Error(1e-5),
-                        max_iterations: 1000,
-                    },
-                    seed: 0,
-                    replicate: replicate as u64,
-                };
-                solve(&world, &patches, &config).expect("solves")
-            })
-            .collect();
-        let solved = start.elapsed().as_secs_f64();
-        let receivers = world.receivers(&positions, &normals);
-        let config = GatherConfig {
-            rays: m,
-            shadow_rays: shadow,
-            replicates,
-            components: Components::All,
-            seed: 0,
-        };
-        let result = gather(&world, &patches, &solutions, &receivers, &keys, &config);
-        let total = start.elapsed().as_secs_f64();
-        let values: Vec<Irradiance> = result
-            .iter()
-            .map(luxel_solver::gather::Gathered::irradiance)
-            .collect();
-        let direct: Vec<Irradiance> = result.iter().map(|g| g.direct).collect();
-        let error = Errors::new(&values, &reference.irradiance, &reference.stderr);
-        let direct = Errors::new(&direct, &reference.direct, &vec![[0.0; 3]; direct.len()]);
-        let se = (result
-            .iter()
-            .map(|g| g.standard_error.0.length_squared())
-            .sum::<f64>()
-            / (3 * result.len()) as f64)
-            .sqrt()
-            / error.mean;
-        println!(
-            "{:>14} {k:>5} {m:>5} {shadow:>4} | {:.3} {:.3} {:.3} {:.3} {:.3} | {:.3} {:.2} {:+.3} {:.3} {:+.3} | {:.3} iterations {} {}",
-            patches.len(),
-            loaded,
-            meshed - loaded,
-            solved - meshed,
-            total - solved,
-            total,
-            100.0 * error.nrmse,
-            100.0 * error.relative,
-            100.0 * error.bias,
-            100.0 * direct.nrmse,
-            100.0 * direct.bias,
-            100.0 * se,
-            solutions[0].iterations,
-            solutions[0].buried_points,
-        );
+    println!("|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
+    let reference = IrradianceReference::load(scene);
+    for budget in budgets {
+        println!("{}", row(scene, &reference, *budget));
     }
 }
 
-struct Errors {
-    mean: f64,
-    nrmse: f64,
-    relative: f64,
-    bias: f64,
-}
+/// Computes one row.
+fn row(name: &str, reference: &IrradianceReference, budget: Budget) -> String {
+    let mut started = Instant::now();
+    let mut lap = || {
+        let seconds = started.elapsed().as_secs_f64();
+        started = Instant::now();
+        seconds
+    };
+    let scene = luxel_scenes::load(example(name)).expect("an example scene");
+    let world = World::new(&scene.scene);
+    let load = lap();
+    let size = PatchSize::Count(budget.patches);
+    let patches = world.mesh(size).expect("few patches");
+    let mesh = lap();
+    let solutions: Vec<_> = (0..REPLICATES as u64)
+        .map(|replicate| {
+            let config = RadiosityConfig {
+                rays: budget.row_rays,
+                shadow_rays: 1,
+                solver: Config {
+                    tolerance: Tolerance::Error(1e-7),
+                    max_iterations: 20_000,
+                },
+                seed: 0,
+                replicate,
+            };
+            solve(&world, &patches, &config).expect("reflectances below 1")
+        })
+        .collect();
+    let solution = lap();
+    let receivers = world.receivers(&reference.position, &reference.normal);
+    let keys: Vec<Key> = (0..receivers.len() as u64).map(Key::of).collect();
+    let config = GatherConfig {
+        rays: budget.rays,
+        shadow_rays: (3 * budget.rays / 4).min(1024),
+        replicates: REPLICATES,
+        components: Components::All,
+        seed: 0,
+    };
+    let gathered = gather(&world, &patches, &solutions, &receivers, &keys, &config);
+    let gathering = lap();
 
-impl Errors {
-    fn new(values: &[Irradiance], reference: &[[f64; 3]], stderr: &[[f64; 3]]) -> Self {
-        let count = (3 * values.len()) as f64;
-        let mean = reference.iter().flatten().sum::<f64>() / count;
-        let floor = 0.01 * mean;
-        let (mut square, mut relative, mut signed) = (0.0, 0.0, 0.0);
-        for ((value, reference), stderr) in values.iter().zip(reference).zip(stderr) {
-            let difference = value.0 - Rgb::from(*reference);
-            for c in 0..3 {
-                let variance = stderr[c] * stderr[c];
-                square += difference[c].powi(2) - variance;
-                relative +=
-                    (difference[c].powi(2) - variance) / (reference[c].powi(2) + floor * floor);
-                signed += difference[c];
-            }
-        }
-        Self {
-            mean,
-            nrmse: (square / count).max(0.0).sqrt() / mean,
-            relative: (relative / count).max(0.0).sqrt(),
-            bias: signed / count / mean,
-        }
-    }
+    let values: Vec<Rgb> = gathered.iter().map(|g| g.irradiance().0).collect();
+    let errors = Errors::new(&values, &reference.irradiance, &reference.standard_error);
+    let squares: f64 = gathered
+        .iter()
+        .map(|g| g.standard_error.0.length_squared())
+        .sum();
+    let total: f64 = values.iter().map(|value| value.element_sum()).sum();
+    let count = 3.0 * values.len() as f64;
+    let stated = (squares / count).sqrt() / (total / count);
+    let percent = [errors.nrmse, errors.rel_rmse, errors.bias, stated].map(|x| 100.0 * x);
+    let [nrmse, relative, bias, stated] = percent;
+    format!(
+        "| {} | {} | {} | {} | {nrmse:.3} | {relative:.2} | {bias:+.3} | {stated:.3} | {load:.3} | {mesh:.3} \
+         | {solution:.3} | {gathering:.3} |",
+        patches.len(),
+        budget.row_rays,
+        budget.rays,
+        config.shadow_rays,
+    )
 }
