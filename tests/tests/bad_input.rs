@@ -373,26 +373,34 @@ fn what_can_be_put_right_is_warned_of_and_counted() {
 }
 
 #[test]
-fn a_camera_inside_a_wall_gives_a_finite_picture() {
-    // On the plane of the lamp, and behind it in the middle of nothing.
-    for position in ["[0, 2, 0]", "[0, 0, 0]", "[0, -5, 0]"] {
-        let files = Files {
-            toml: replaced(TOML, "[0, 1, 3]", position)
-                .replace("look_at = [0, 1, 0]", "look_at = [0.3, 1, 0.2]"),
-            ..Files::good()
-        };
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        files.write(folder.path());
-        run(folder.path(), VERBS[0]).assert_success();
-        let picture = luxel::image::exr::read(&folder.path().join("out.exr")).expect("a picture");
-        let finite = picture
-            .image
-            .pixels
-            .iter()
-            .flatten()
-            .all(|x| x.is_finite() && *x >= 0.0);
-        assert!(finite, "camera at {position}");
+fn a_camera_inside_a_wall_is_refused_or_gives_a_finite_picture() {
+    let seen_from = |position| Files {
+        toml: replaced(TOML, "[0, 1, 3]", position)
+            .replace("look_at = [0, 1, 0]", "look_at = [0.3, 1, 0.2]"),
+        ..Files::good()
+    };
+    // On the lamp and on the floor these themselves, seen from behind, fill the view.
+    for (position, object) in [("[0, 2, 0]", "lamp"), ("[0, 0, 0]", "floor")] {
+        let mentions = [
+            "camera `main`",
+            &format!("object `{object}`"),
+            "move the camera",
+        ];
+        refuses(
+            &seen_from(position),
+            VERBS[0],
+            ExitCode::InvalidInput,
+            &mentions,
+        );
     }
+    // Far below most rays see nothing.
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    seen_from("[0, -5, 0]").write(folder.path());
+    run(folder.path(), VERBS[0]).assert_success();
+    let picture = luxel::image::exr::read(&folder.path().join("out.exr")).expect("a picture");
+    let mut values = picture.image.pixels.iter().flatten();
+    assert!(values.all(|x| x.is_finite() && *x >= 0.0));
+
     // No view at all: the camera looks at itself.
     let files = Files {
         toml: replaced(TOML, "[0, 1, 3]", "[0, 1, 0]"),
