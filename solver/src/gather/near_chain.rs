@@ -1,10 +1,10 @@
 //! Gather rays whose hits are too near to be looked up go on as paths.
 //!
-//! At a hit y nearer than the size of its patch, B(y) = ρ(y) (E^direct(y) + B(next)): direct light
-//! by one shadow ray to a light chosen by its contribution, and one cosine-distributed ray onwards,
-//! until a hit is far enough to be looked up in its far class. From the second link on the path
-//! survives with probability max ρ (Russian roulette, unbiased); after [`MAX_LINKS`] links the
-//! class of its distance answers.
+//! At a hit y nearer than about the size of its patch ([`REACH`]), B(y) = ρ(y) (E^direct(y) +
+//! B(next)): direct light by one shadow ray to a light chosen by its contribution, and one
+//! cosine-distributed ray onwards, until a hit is far enough to be looked up in its far class. From
+//! the second link on the path survives with probability max ρ (Russian roulette, unbiased); after
+//! [`MAX_LINKS`] links the class of its distance answers.
 //!
 //! Measured on furnished rooms: the error that finite patches make falls 1.3–3 times, and the
 //! relative error in dark places from 219 % to 4.5 %.
@@ -21,6 +21,12 @@ use luxel_scenes::{Irradiance, Rgb};
 /// Links after which a chain is looked up wherever it is: light in crevices of that depth is
 /// below 1 % of what entered for ρ ≤ 0.75. More measured no different.
 const MAX_LINKS: u32 = 16;
+
+/// Distance, in sizes of the patch that is hit, from which it is looked up: a tuned value. Smaller,
+/// and fine meshes get dark gaps wrong (17 000 patches of a furnished office at 1, 1.5 and 2: 9.4,
+/// 4.2 and 2.7 % relRMSE, 0.91, 0.84 and 0.81 % nRMSE); larger, and longer chains bring noise (the
+/// default budget: 1.26, 1.26 and 1.27 %, bare rooms 3 % of the error more at 2) and time.
+const REACH: f32 = 1.5;
 
 /// A path on its way: what it will add to its receiver is its throughput times B at the next hit.
 #[derive(Clone, Copy)]
@@ -159,8 +165,9 @@ impl<'a> Chains<'a> {
             if throughput == Rgb::ZERO {
                 continue;
             }
-            let class = Class::at(hit.t, self.patches.size(patch));
-            if class == Class::FAR || link == MAX_LINKS {
+            let size = self.patches.size(patch);
+            let class = Class::at(hit.t, size);
+            if hit.t >= REACH * size || link == MAX_LINKS {
                 found.indirect += throughput * solution.irradiance(patch, class).0;
             } else {
                 near.push((
