@@ -24,6 +24,8 @@ pub mod world;
 
 pub mod radiosity;
 
+pub mod error;
+
 pub mod gather;
 
 pub mod audit;

@@ -1,0 +1,13 @@
+//! What is wrong with a result, and by how much: estimates of error.
+//!
+//! Every result has three errors of different kinds:
+//!
+//! | part | what it is | how it is known |
+//! |---|---|---|
+//! | solver | what the iteration leaves | a rigorous bound from the residual ([`crate::solvers`]) |
+//! | sampling | noise of rows, of shadow rays and of the gather | the scatter of independent randomisations, [moderated](moderate) |
+//! | discretisation | patches of finite size | two meshes looked up at the same hits ([`crate::gather`]) |
+
+mod moderate;
+
+pub use moderate::moderate;
