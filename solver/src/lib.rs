@@ -26,6 +26,8 @@ pub mod radiosity;
 
 pub mod error;
 
+pub mod pilot;
+
 pub mod gather;
 
 pub mod audit;

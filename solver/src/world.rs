@@ -3,7 +3,7 @@
 use crate::bvh::{Bvh, Hit, Ray};
 use crate::direct::Lights;
 use crate::geometry::ray_origin;
-use crate::patches::{MeshError, PatchId, PatchSize, Patches, Side};
+use crate::patches::{Density, MeshError, PatchId, PatchSize, Patches, Side};
 use crate::surface::{SurfacePoint, Surfaces};
 use glam::{DVec3, Vec3};
 use luxel_scenes::{FaceId, Scene};
@@ -82,6 +82,14 @@ impl<'s> World<'s> {
     /// As [`Patches::mesh`].
     pub fn mesh(&self, size: PatchSize) -> Result<Patches, MeshError> {
         Patches::mesh(&self.surfaces, &self.bvh, size)
+    }
+
+    /// Meshes the scene into about `count` patches, as finely in each place as `density` says.
+    ///
+    /// # Errors
+    /// As [`Patches::mesh_with_density`].
+    pub fn mesh_with_density(&self, count: usize, density: &Density) -> Result<Patches, MeshError> {
+        Patches::mesh_with_density(&self.surfaces, &self.bvh, count, density)
     }
 
     /// What a ray met; `None` for a miss.

@@ -23,19 +23,22 @@ const EXTENT: f64 = 1.6;
 struct Cluster {
     material: MaterialId,
     normal: DVec3,
+    /// Side of a patch at its first face.
+    size: f64,
     area: f64,
     lower: DVec3,
     upper: DVec3,
     faces: Vec<FaceId>,
 }
 
-/// Groups `faces` (in leaf order) into clusters of at most `size`² area, in the unit frame.
+/// Groups `faces` (in leaf order) into clusters of at most the square of their `size_of` in area, in
+/// the unit frame.
 pub(super) fn cluster(
     geometry: &Geometry,
     faces: impl Iterator<Item = FaceId>,
     material_of: impl Fn(FaceId) -> MaterialId,
     area_of: impl Fn(FaceId) -> f64,
-    size: f64,
+    size_of: impl Fn(FaceId) -> f64,
 ) -> Vec<Vec<FaceId>> {
     let mut clusters: Vec<Cluster> = Vec::new();
     let mut open: Vec<usize> = Vec::with_capacity(OPEN);
@@ -46,8 +49,8 @@ pub(super) fn cluster(
             let side = cluster.upper.max(upper) - cluster.lower.min(lower);
             cluster.material == material
                 && cluster.normal.dot(normal) > CONE
-                && cluster.area + area <= size * size
-                && side.max_element() <= EXTENT * size
+                && cluster.area + area <= cluster.size * cluster.size
+                && side.max_element() <= EXTENT * cluster.size
         };
         if let Some(slot) = open.iter().rposition(|&index| fits(&clusters[index])) {
             let cluster = &mut clusters[open[slot]];
@@ -63,6 +66,7 @@ pub(super) fn cluster(
             clusters.push(Cluster {
                 material,
                 normal,
+                size: size_of(face),
                 area,
                 lower,
                 upper,

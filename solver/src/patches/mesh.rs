@@ -2,8 +2,11 @@
 
 use super::clipped::Clipped;
 use super::cluster::{self, cluster};
+use super::density::{self, Density};
+use super::quad_grid::QuadGrid;
 use super::quads;
-use super::region::{Quad, Region, Shape};
+use super::region::{Region, Shape};
+use super::triangle_grid::TriangleGrid;
 use super::{PatchId, Patches, Side};
 use crate::bvh::Bvh;
 use crate::geometry::Geometry;
@@ -58,45 +61,41 @@ const LARGE_FACE: f64 = 0.7;
 const COUNT_TOLERANCE: f64 = 0.1;
 
 impl Patches {
-    /// Meshes a scene.
+    /// Meshes a scene, everywhere as finely.
     ///
     /// # Errors
     /// [`MeshError`] when the size is not a positive number or makes too many patches.
     pub fn mesh(surfaces: &Surfaces, bvh: &Bvh, size: PatchSize) -> Result<Self, MeshError> {
-        let geometry = surfaces.geometry();
-        let areas: Vec<f64> = (0..geometry.face_count())
-            .map(|index| surfaces.area(FaceId::new(index)))
-            .collect();
-        let total: f64 = areas.iter().sum();
-        let metres = geometry.frame().metres_per_unit;
+        let mesher = Mesher::new(surfaces, bvh, None);
         let regions = match size {
-            PatchSize::Whole => (0..areas.len())
-                .map(|i| single(vec![FaceId::new(i)], &areas))
+            PatchSize::Whole => (0..mesher.areas.len())
+                .map(|i| single(vec![FaceId::new(i)], &mesher.areas))
                 .collect(),
-            PatchSize::Objects => objects(surfaces, &areas),
+            PatchSize::Objects => objects(surfaces, &mesher.areas),
             PatchSize::Length(length) => {
                 if !(length > 0.0 && length.is_finite()) {
                     return Err(MeshError::Size(length));
                 }
-                divide(surfaces, bvh, &areas, length / metres, total)?
+                mesher.divide(length / surfaces.geometry().frame().metres_per_unit)?
             }
-            PatchSize::Count(count) => {
-                let wanted = count.max(1) as f64;
-                let mut side = (total / wanted).sqrt();
-                let mut regions = divide(surfaces, bvh, &areas, side, total)?;
-                for _ in 0..3 {
-                    let made: f64 = regions.iter().map(|r| f64::from(r.element_count())).sum();
-                    let ratio = made / wanted;
-                    if (ratio - 1.0).abs() <= COUNT_TOLERANCE {
-                        break;
-                    }
-                    side *= ratio.sqrt();
-                    regions = divide(surfaces, bvh, &areas, side, total)?;
-                }
-                regions
-            }
+            PatchSize::Count(count) => mesher.divide_into(count)?,
         };
         Ok(assemble(surfaces, regions, size == PatchSize::Objects))
+    }
+
+    /// Meshes a scene into about `count` patches, as finely in each place as `density` says: from
+    /// face to face, and within a large one by quadtrees over its grid.
+    ///
+    /// # Errors
+    /// [`MeshError`] when the count makes too many patches.
+    pub fn mesh_with_density(
+        surfaces: &Surfaces,
+        bvh: &Bvh,
+        count: usize,
+        density: &Density,
+    ) -> Result<Self, MeshError> {
+        let regions = Mesher::new(surfaces, bvh, Some(density)).divide_into(count)?;
+        Ok(assemble(surfaces, regions, false))
     }
 }
 
@@ -114,63 +113,166 @@ fn objects(surfaces: &Surfaces, areas: &[f64]) -> Vec<Region> {
         .collect()
 }
 
-/// Cuts the scene into regions with elements of side `size` (in units).
-fn divide(
-    surfaces: &Surfaces,
-    bvh: &Bvh,
-    areas: &[f64],
-    size: f64,
+/// What regions are made from.
+struct Mesher<'m, 's> {
+    surfaces: &'m Surfaces<'s>,
+    bvh: &'m Bvh,
+    /// Of each face.
+    areas: Vec<f64>,
+    /// Of all faces.
     total: f64,
-) -> Result<Vec<Region>, MeshError> {
-    let geometry = surfaces.geometry();
-    if total / (size * size) > MAX_PATCHES as f64 {
-        return Err(MeshError::TooMany {
-            size: size * geometry.frame().metres_per_unit,
-            count: total / (size * size),
-            limit: MAX_PATCHES,
-        });
-    }
-    let is_large = |face: FaceId| areas[face.index()] >= LARGE_FACE * size * size;
-    let large: Vec<FaceId> = (0..areas.len())
-        .map(FaceId::new)
-        .filter(|&f| is_large(f))
-        .collect();
-    let mut regions = Vec::new();
-    let mut joined = vec![false; areas.len()];
-    for quad in quads::join(geometry, &large, |face| surfaces.material_id(face)) {
-        for face in quad.faces {
-            joined[face.index()] = true;
-        }
-        regions.push(region(quad_shape(quad.corners, size), quad.faces.to_vec()));
-    }
-    for &face in large.iter().filter(|face| !joined[face.index()]) {
-        let polygon = geometry.polygon(face);
-        if let Ok(corners) = <[DVec3; 4]>::try_from(polygon.as_slice())
-            && quads::is_convex(corners, geometry.normal(face))
-        {
-            regions.push(region(quad_shape(corners, size), vec![face]));
-        } else if let Ok(corners) = <[DVec3; 3]>::try_from(polygon.as_slice()) {
-            let side = (areas[face.index()].sqrt() / size).round().max(1.0) as u32;
-            regions.push(region(Shape::Triangle { corners, side }, vec![face]));
-        } else {
-            regions.push(region(polygon_shape(&polygon, size), vec![face]));
+    density: Option<&'m Density>,
+}
+
+impl<'m, 's> Mesher<'m, 's> {
+    fn new(surfaces: &'m Surfaces<'s>, bvh: &'m Bvh, density: Option<&'m Density>) -> Self {
+        let areas: Vec<f64> = (0..surfaces.geometry().face_count())
+            .map(|index| surfaces.area(FaceId::new(index)))
+            .collect();
+        let total = areas.iter().sum();
+        Self {
+            surfaces,
+            bvh,
+            areas,
+            total,
+            density,
         }
     }
-    let mut seen = vec![false; areas.len()];
-    let small = bvh
-        .leaf_order()
-        .iter()
-        .map(|&triangle| geometry.face(triangle))
-        .filter(|face| !is_large(*face) && !std::mem::replace(&mut seen[face.index()], true));
-    let clusters = cluster(
-        geometry,
-        small,
-        |face| surfaces.material_id(face),
-        |face| areas[face.index()],
-        size,
-    );
-    regions.extend(clusters.into_iter().map(|members| single(members, areas)));
-    Ok(regions)
+
+    /// Patches per area on a face, relative to the mean.
+    fn face_density(&self, face: FaceId) -> f64 {
+        self.density.map_or(1.0, |density| density.face(face))
+    }
+
+    /// Cuts the scene into about `count` elements.
+    fn divide_into(&self, count: usize) -> Result<Vec<Region>, MeshError> {
+        let wanted = count.max(1) as f64;
+        let mut side = (self.total / wanted).sqrt();
+        let mut regions = self.divide(side)?;
+        for _ in 0..3 {
+            let made: f64 = regions.iter().map(|r| f64::from(r.element_count())).sum();
+            let ratio = made / wanted;
+            if (ratio - 1.0).abs() <= COUNT_TOLERANCE {
+                break;
+            }
+            side *= ratio.sqrt();
+            regions = self.divide(side)?;
+        }
+        Ok(regions)
+    }
+
+    /// Cuts the scene into regions with elements of side `size` (in units) where the density is one.
+    fn divide(&self, size: f64) -> Result<Vec<Region>, MeshError> {
+        let geometry = self.surfaces.geometry();
+        if self.total / (size * size) > MAX_PATCHES as f64 {
+            return Err(MeshError::TooMany {
+                size: size * geometry.frame().metres_per_unit,
+                count: self.total / (size * size),
+                limit: MAX_PATCHES,
+            });
+        }
+        let is_large = |face: FaceId| {
+            self.areas[face.index()] * self.face_density(face) >= LARGE_FACE * size * size
+        };
+        let large: Vec<FaceId> = (0..self.areas.len())
+            .map(FaceId::new)
+            .filter(|&f| is_large(f))
+            .collect();
+        let mut regions = Vec::new();
+        let mut joined = vec![false; self.areas.len()];
+        for quad in quads::join(geometry, &large, |face| self.surfaces.material_id(face)) {
+            for face in quad.faces {
+                joined[face.index()] = true;
+            }
+            let shape = self.quad_shape(quad.corners, &quad.faces, size);
+            regions.push(region(shape, quad.faces.to_vec()));
+        }
+        for &face in large.iter().filter(|face| !joined[face.index()]) {
+            let polygon = geometry.polygon(face);
+            let shape = if let Ok(corners) = <[DVec3; 4]>::try_from(polygon.as_slice())
+                && quads::is_convex(corners, geometry.normal(face))
+            {
+                self.quad_shape(corners, &[face], size)
+            } else if let Ok(corners) = <[DVec3; 3]>::try_from(polygon.as_slice()) {
+                self.triangle_shape(corners, face, size)
+            } else {
+                polygon_shape(&polygon, size / self.face_density(face).sqrt())
+            };
+            regions.push(region(shape, vec![face]));
+        }
+        let mut seen = vec![false; self.areas.len()];
+        let small = self
+            .bvh
+            .leaf_order()
+            .iter()
+            .map(|&triangle| geometry.face(triangle))
+            .filter(|face| !is_large(*face) && !std::mem::replace(&mut seen[face.index()], true));
+        let clusters = cluster(
+            geometry,
+            small,
+            |face| self.surfaces.material_id(face),
+            |face| self.areas[face.index()],
+            |face| size / self.face_density(face).sqrt(),
+        );
+        regions.extend(
+            clusters
+                .into_iter()
+                .map(|members| single(members, &self.areas)),
+        );
+        Ok(regions)
+    }
+
+    fn quad_shape(&self, corners: [DVec3; 4], faces: &[FaceId], size: f64) -> Shape {
+        let Some(density) = self.density else {
+            return Shape::Quad(QuadGrid::new(corners, size));
+        };
+        let at = |position| density.at(self.surfaces, faces, position);
+        let whole = QuadGrid::new(corners, f64::INFINITY);
+        let cells = faces
+            .iter()
+            .map(|face| self.areas[face.index()] * density.face(*face))
+            .sum::<f64>()
+            / (size * size);
+        let wanted: Vec<f64> = density::centres(density::region_samples(cells))
+            .map(|[s, t]| at(whole.at(s, t)))
+            .collect();
+        let grid = density::grid_density(&wanted);
+        let shape = QuadGrid::new(corners, size / grid.sqrt());
+        Shape::Quad(shape.divided(|node| {
+            let own = grid * 4f64.powi(i32::from(node.level));
+            density::divides(own, |sample| at(shape.point(node, sample)))
+        }))
+    }
+
+    fn triangle_shape(&self, corners: [DVec3; 3], face: FaceId, size: f64) -> Shape {
+        let area = self.areas[face.index()];
+        let Some(density) = self.density else {
+            return Shape::Triangle(TriangleGrid::new(corners, area, size));
+        };
+        let at = |position| density.at(self.surfaces, &[face], position);
+        let whole = TriangleGrid::new(corners, area, f64::INFINITY);
+        let samples = density::region_samples(area * density.face(face) / (size * size));
+        let wanted: Vec<f64> = density::centres(samples)
+            .map(fold)
+            .map(|[x, y]| at(whole.at(x, y)))
+            .collect();
+        let grid = density::grid_density(&wanted);
+        let shape = TriangleGrid::new(corners, area, size / grid.sqrt());
+        Shape::Triangle(shape.divided(|node| {
+            let own = grid * 4f64.powi(i32::from(node.level));
+            density::divides(own, |sample| at(shape.point(node, fold(sample))))
+        }))
+    }
+}
+
+/// Folds the unit square onto the half of it below its diagonal: weights of two corners of a
+/// triangle.
+fn fold([x, y]: [f64; 2]) -> [f64; 2] {
+    if x + y <= 1.0 {
+        [x, y]
+    } else {
+        [1.0 - x, 1.0 - y]
+    }
 }
 
 fn region(shape: Shape, faces: Vec<FaceId>) -> Region {
@@ -194,19 +296,6 @@ fn single(members: Vec<FaceId>, areas: &[f64]) -> Region {
         })
         .collect();
     region(Shape::Faces { cumulative }, members)
-}
-
-fn quad_shape(corners: [DVec3; 4], size: f64) -> Shape {
-    let [a, b, c, d] = corners;
-    let count = |first: DVec3, second: DVec3| {
-        ((first.length() + second.length()) / (2.0 * size))
-            .round()
-            .max(1.0) as u32
-    };
-    Shape::Quad(Quad {
-        corners,
-        counts: [count(b - a, c - d), count(d - a, c - b)],
-    })
 }
 
 /// A polygon of five or more corners is covered by the grid of its box in its own plane.

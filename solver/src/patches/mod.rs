@@ -8,10 +8,15 @@
 
 mod clipped;
 mod cluster;
+mod density;
+mod forest;
 mod mesh;
+mod quad_grid;
 mod quads;
 mod region;
+mod triangle_grid;
 
+pub use density::Density;
 pub use mesh::{MAX_PATCHES, MeshError, PatchSize};
 pub use region::SurfaceSample;
 

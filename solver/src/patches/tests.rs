@@ -1,6 +1,6 @@
 //! Laws of the mesh: areas add up, and a point drawn from a patch is found in that patch.
 
-use super::{MeshError, PatchSize, Patches, Side};
+use super::{Density, MeshError, PatchSize, Patches, Side};
 use crate::sampling::{Stage, hash};
 use crate::world::World;
 use glam::DVec3;
@@ -204,4 +204,93 @@ fn impossible_sizes_are_errors() {
         world.mesh(PatchSize::Length(1e-7)).err(),
         Some(MeshError::TooMany { .. })
     ));
+}
+
+/// A density that grows along x, on a pilot of `count` patches.
+fn sloped(world: &World, count: usize) -> Density {
+    let geometry = world.surfaces().geometry();
+    let pilot = world.mesh(PatchSize::Count(count)).expect("meshes");
+    let values: Vec<f64> = pilot
+        .ids()
+        .map(|patch| {
+            let x = pilot.sample(geometry, patch, [0.5, 0.5]).position.x;
+            (2.0 * geometry.frame().to_world(DVec3::X * x).x).exp()
+        })
+        .collect();
+    Density::new(world.surfaces(), pilot, values)
+}
+
+#[test]
+fn points_are_found_in_graded_meshes_too() {
+    for (sidedness, sides) in [(Sidedness::Front, 1.0), (Sidedness::Both, 2.0)] {
+        let scene = scene_of(&mixed(), sidedness);
+        let world = World::new(&scene);
+        let density = sloped(&world, 300);
+        for count in [30, 3000] {
+            let patches = world.mesh_with_density(count, &density).expect("meshes");
+            check_laws(&world, &patches, sides);
+        }
+    }
+}
+
+#[test]
+fn densities_have_a_mean_of_one() {
+    let scene = scene_of(&mixed(), Sidedness::Both);
+    let world = World::new(&scene);
+    let density = sloped(&world, 300);
+    let (mut sum, mut total) = (0.0, 0.0);
+    for face in world.scene().face_ids() {
+        let area = world.surfaces().area(face);
+        sum += area * density.face(face);
+        total += area;
+    }
+    // Faces get the mean of their region, so that the sum over regions is that over faces, up to
+    // the cells clipped away at the rim of the disk.
+    assert!((sum / total - 1.0).abs() < 0.01, "{}", sum / total);
+}
+
+#[test]
+fn patches_are_as_dense_as_was_asked_for() {
+    let scene = scene_of(
+        &[
+            vec![
+                DVec3::ZERO,
+                DVec3::new(4.0, 0.0, 0.0),
+                DVec3::new(4.0, 1.0, 0.0),
+                DVec3::new(0.0, 1.0, 0.0),
+            ],
+            vec![
+                DVec3::new(0.0, 0.0, 1.0),
+                DVec3::new(4.0, 0.0, 1.0),
+                DVec3::new(0.0, 4.0, 1.0),
+            ],
+        ],
+        Sidedness::Front,
+    );
+    let world = World::new(&scene);
+    let geometry = world.surfaces().geometry();
+    // The far half is worth nine times as many patches per area as the near one.
+    let pilot = world.mesh(PatchSize::Length(0.25)).expect("meshes");
+    let is_far = |patches: &Patches, patch| {
+        let centre = patches.sample(geometry, patch, [0.5, 0.5]).position;
+        geometry.frame().to_world(centre).x > 2.0
+    };
+    let values = pilot
+        .ids()
+        .map(|patch| if is_far(&pilot, patch) { 9.0 } else { 1.0 })
+        .collect();
+    let density = Density::new(world.surfaces(), pilot, values);
+    let patches = world.mesh_with_density(4000, &density).expect("meshes");
+    let made = patches.len() as f64;
+    assert!((made / 4000.0 - 1.0).abs() < 0.15, "{made} patches");
+    let mut halves = [[0.0, 0.0]; 2];
+    for patch in patches.ids() {
+        let half = &mut halves[usize::from(is_far(&patches, patch))];
+        half[0] += 1.0;
+        half[1] += patches.areas()[patch.index()];
+    }
+    let [near, far] = halves.map(|[count, area]| count / area);
+    // Levels of quadtrees are four apart: within a factor of two of nine, and the grid is chosen
+    // between them.
+    assert!((4.5..18.0).contains(&(far / near)), "{}", far / near);
 }

@@ -1,0 +1,124 @@
+//! A convex quad P(s, t), bilinear in its corners, divided along lines of constant s and t.
+
+use super::forest::{Forest, Node};
+use glam::{DVec2, DVec3};
+
+/// The quad with its grid.
+#[derive(Clone, Debug)]
+pub(super) struct QuadGrid {
+    /// P(0,0), P(1,0), P(1,1), P(0,1).
+    corners: [DVec3; 4],
+    /// Cells of the grid along s and t.
+    counts: [u32; 2],
+    forest: Forest,
+}
+
+impl QuadGrid {
+    /// A grid of cells of side about `size`.
+    pub(super) fn new(corners: [DVec3; 4], size: f64) -> Self {
+        let [a, b, c, d] = corners;
+        let count = |first: DVec3, second: DVec3| {
+            ((first.length() + second.length()) / (2.0 * size))
+                .round()
+                .max(1.0) as u32
+        };
+        let counts = [count(b - a, c - d), count(d - a, c - b)];
+        Self {
+            corners,
+            counts,
+            forest: Forest::uniform(counts[0] * counts[1]),
+        }
+    }
+
+    /// The same grid with some nodes divided.
+    pub(super) fn divided(&self, divides: impl FnMut(Node) -> bool) -> Self {
+        Self {
+            forest: Forest::grow(self.counts[0] * self.counts[1], divides),
+            ..self.clone()
+        }
+    }
+
+    pub(super) fn forest(&self) -> &Forest {
+        &self.forest
+    }
+
+    /// The point of parameters s, t in [0, 1].
+    pub(super) fn at(&self, s: f64, t: f64) -> DVec3 {
+        let [a, b, c, d] = self.corners;
+        a.lerp(b, s).lerp(d.lerp(c, s), t)
+    }
+
+    /// What keeps the quad from being a parallelogram.
+    fn twist(&self) -> DVec3 {
+        let [a, b, c, d] = self.corners;
+        (a + c) - (b + d)
+    }
+
+    pub(super) fn is_parallelogram(&self) -> bool {
+        let [a, _, c, _] = self.corners;
+        self.twist().length_squared() <= 1e-24 * (c - a).length_squared()
+    }
+
+    /// (s, t) of a point of the quad's plane, clamped to [0, 1]². Lines of constant s are
+    /// straight, so s solves the quadratic (a + s(b−a) − p) × ((d−a) + s·twist) = 0.
+    fn invert(&self, p: DVec3) -> DVec2 {
+        let [a, b, c, d] = self.corners;
+        let normal = (c - a).cross(d - b);
+        let cross = |u: DVec3, v: DVec3| u.cross(v).dot(normal);
+        let (e, f, g, h) = (b - a, d - a, self.twist(), p - a);
+        let (k2, k1, k0) = (cross(e, g), cross(e, f) - cross(h, g), -cross(h, f));
+        // The root that stays finite as the twist vanishes; k1 > 0 in a convex quad.
+        let discriminant = (k1 * k1 - 4.0 * k2 * k0).max(0.0).sqrt();
+        let s = -2.0 * k0 / (k1 + discriminant);
+        let (start, end) = (a.lerp(b, s), d.lerp(c, s));
+        let t = (p - start).dot(end - start) / (end - start).length_squared();
+        DVec2::new(s, t).clamp(DVec2::ZERO, DVec2::ONE)
+    }
+
+    pub(super) fn element_at(&self, p: DVec3) -> u32 {
+        let [nu, nv] = self.counts;
+        let mut local = self.invert(p) * DVec2::new(f64::from(nu), f64::from(nv));
+        let cell = [(local.x as u32).min(nu - 1), (local.y as u32).min(nv - 1)];
+        local -= DVec2::new(f64::from(cell[0]), f64::from(cell[1]));
+        self.forest.find(cell[1] * nu + cell[0], || {
+            local *= 2.0;
+            let half = [local.x, local.y].map(|x| u32::from(x >= 1.0));
+            local -= DVec2::new(f64::from(half[0]), f64::from(half[1]));
+            half[0] + 2 * half[1]
+        })
+    }
+
+    /// The rectangle of parameters of a node: lower s and t, and its extent in both. The same edge
+    /// gives the same bits on both of its sides and on every level.
+    fn rectangle(&self, node: Node) -> [[f64; 2]; 2] {
+        let nu = self.counts[0];
+        let mut index = [node.root % nu, node.root / nu].map(u64::from);
+        for quadrant in node.quadrants() {
+            index = [
+                2 * index[0] + u64::from(quadrant & 1),
+                2 * index[1] + u64::from(quadrant >> 1),
+            ];
+        }
+        [0, 1].map(|axis| {
+            let count = (u64::from(self.counts[axis]) << node.level) as f64;
+            [index[axis], index[axis] + 1].map(|line| line as f64 / count)
+        })
+    }
+
+    /// A point of a node, (x, y) in [0, 1]² of its rectangle.
+    pub(super) fn point(&self, node: Node, [x, y]: [f64; 2]) -> DVec3 {
+        let [[s0, s1], [t0, t1]] = self.rectangle(node);
+        self.at(s0 + (s1 - s0) * x, t0 + (t1 - t0) * y)
+    }
+
+    /// The corners of an element.
+    pub(super) fn cell(&self, element: u32) -> [DVec3; 4] {
+        let [[s0, s1], [t0, t1]] = self.rectangle(self.forest.leaf(element));
+        [
+            self.at(s0, t0),
+            self.at(s1, t0),
+            self.at(s1, t1),
+            self.at(s0, t1),
+        ]
+    }
+}
