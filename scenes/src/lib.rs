@@ -25,14 +25,16 @@ pub mod obj;
 pub mod radiometry;
 pub mod scene;
 pub mod scene_file;
+pub mod sky;
 pub mod texture_file;
 
 pub use camera::{Camera, FieldOfView, Projection};
 pub use id::{FaceId, MaterialId, ObjectId, TextureId};
-pub use light::{Light, LightKind, Sky};
+pub use light::{Light, LightKind};
 pub use load::{FailureKind, LoadError, Loaded, Warning, load};
 pub use material::{Material, Sidedness, Specular, Texture};
 pub use radiometry::{
     Exitance, Flux, Intensity, Irradiance, Radiance, Radiosity, Reflectance, Rgb,
 };
 pub use scene::{Corners, Face, Object, Scene, UnitSystem};
+pub use sky::Sky;

@@ -4,6 +4,7 @@
 
 use crate::id::TextureId;
 use crate::radiometry::{Intensity, Irradiance, Radiance};
+use crate::sky::Sky;
 use glam::DVec3;
 
 /// A named light.
@@ -23,6 +24,16 @@ pub enum LightKind {
         /// Position in metres.
         position: DVec3,
         /// Intensity in W/sr, the same in all directions.
+        intensity: Intensity,
+    },
+    /// A point source with Lambert's distribution, that of a small diffuse luminaire: I cos θ at the
+    /// angle θ from its direction, nothing behind it.
+    Lambertian {
+        /// Position in metres.
+        position: DVec3,
+        /// Unit vector in which it shines.
+        direction: DVec3,
+        /// Intensity in that direction in W/sr.
         intensity: Intensity,
     },
     /// A point source that shines into a cone, as `KHR_lights_punctual` defines it: full intensity
@@ -50,8 +61,10 @@ pub enum LightKind {
     Sky {
         /// The formula.
         sky: Sky,
-        /// Unit vector to the zenith. Directions below the horizon carry no light.
+        /// Unit vector to the zenith.
         up: DVec3,
+        /// Radiance in W/(m² sr) from below the horizon: that of a level ground far away.
+        ground: Radiance,
     },
     /// Radiance from an image of all directions (latitude–longitude, top row at the zenith).
     Environment {
@@ -64,32 +77,4 @@ pub enum LightKind {
         /// Unit vector to the top of the image.
         up: DVec3,
     },
-}
-
-/// Sky models, radiance over the upper hemisphere.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Sky {
-    /// The same radiance everywhere.
-    Uniform {
-        /// Radiance in W/(m² sr).
-        radiance: Radiance,
-    },
-    /// CIE (Moon–Spencer) overcast sky: L(γ) = Lz (1 + 2 sin γ) / 3 at altitude γ.
-    CieOvercast {
-        /// Radiance at the zenith in W/(m² sr).
-        zenith: Radiance,
-    },
-}
-
-impl Sky {
-    /// Radiance from the direction whose sine of altitude is `sin_altitude`; zero below the horizon.
-    pub fn radiance(self, sin_altitude: f64) -> Radiance {
-        if sin_altitude < 0.0 {
-            return Radiance::ZERO;
-        }
-        match self {
-            Self::Uniform { radiance } => radiance,
-            Self::CieOvercast { zenith } => zenith * ((1.0 + 2.0 * sin_altitude) / 3.0),
-        }
-    }
 }

@@ -22,8 +22,9 @@ use std::time::Instant;
 /// Independent randomisations of every estimate: what its standard error is made of.
 const REPLICATES: u32 = 4;
 
-/// Most shadow rays of a point; beyond them the noise of direct light is negligible.
-const MAX_SHADOW_RAYS: usize = 1024;
+/// Shadow rays of a point beyond which the noise of direct light is most often negligible; a light
+/// of which little is seen gets more of a large budget.
+const ENOUGH_SHADOW_RAYS: usize = 1024;
 
 /// Fraction of back hits from which a point is reported as lying inside a solid.
 const BURIED: f64 = 0.5;
@@ -243,7 +244,7 @@ fn gather_irradiance(
 ) -> Result<Vec<Estimate>, Failure> {
     let config = GatherConfig {
         rays,
-        shadow_rays: (rays * 3 / 4).min(MAX_SHADOW_RAYS),
+        shadow_rays: (rays * 3 / 4).min(ENOUGH_SHADOW_RAYS.max(rays / 16)),
         replicates: REPLICATES as usize,
         components,
         seed: context.common.seed,

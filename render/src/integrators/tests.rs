@@ -396,6 +396,7 @@ fn a_uniform_sky_gives_an_open_point_pi_times_its_radiance() {
                 radiance: Radiance::splat(2.0),
             },
             up: DVec3::Z,
+            ground: Radiance::ZERO,
         },
     });
     let world = World::new(&scene);

@@ -29,7 +29,9 @@ pub(super) fn report(scene: &Scene, findings: &mut Vec<Finding>) {
         findings.push(Finding::SuspiciousSize { extent });
     }
     for light in &scene.lights {
-        let (LightKind::Point { position, .. } | LightKind::Spot { position, .. }) = light.kind
+        let (LightKind::Point { position, .. }
+        | LightKind::Lambertian { position, .. }
+        | LightKind::Spot { position, .. }) = light.kind
         else {
             continue;
         };

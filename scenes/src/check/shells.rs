@@ -45,7 +45,9 @@ pub(super) fn report(scene: &Scene, edges: &[Edge], findings: &mut Vec<Finding>)
     };
     let cameras = scene.cameras.iter().map(|camera| camera.position);
     let lights = scene.lights.iter().filter_map(|light| match light.kind {
-        LightKind::Point { position, .. } | LightKind::Spot { position, .. } => Some(position),
+        LightKind::Point { position, .. }
+        | LightKind::Lambertian { position, .. }
+        | LightKind::Spot { position, .. } => Some(position),
         _ => None,
     });
     let points: Vec<DVec3> = cameras.chain(lights).collect();

@@ -7,7 +7,7 @@ use super::place::Place;
 use super::warning::Warning;
 use crate::assemble::MAX_COORDINATE;
 use crate::id::FaceId;
-use crate::light::{LightKind, Sky};
+use crate::light::LightKind;
 use crate::material::{Material, Specular};
 use crate::radiometry::{Reflectance, Rgb};
 use crate::scene::{Scene, UnitSystem};
@@ -214,14 +214,16 @@ fn settle_units(merged: &mut Merged, declared: Option<UnitSystem>) {
 
 fn scale_light(kind: &mut LightKind, factor: f64) {
     match kind {
-        LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => {
+        LightKind::Point { intensity, .. }
+        | LightKind::Lambertian { intensity, .. }
+        | LightKind::Spot { intensity, .. } => {
             *intensity = *intensity * factor;
         }
         LightKind::Directional { irradiance, .. } => *irradiance = *irradiance * factor,
-        LightKind::Sky { sky, .. } => match sky {
-            Sky::Uniform { radiance } => *radiance = *radiance * factor,
-            Sky::CieOvercast { zenith } => *zenith = *zenith * factor,
-        },
+        LightKind::Sky { sky, ground, .. } => {
+            *sky = sky.scaled(factor);
+            *ground = *ground * factor;
+        }
         LightKind::Environment { scale, .. } => *scale = *scale * factor,
     }
 }

@@ -7,15 +7,17 @@
 //! | sky | `radiance`, `nits` (everywhere, or at the zenith), or `lux`, `watts_per_square_metre` on the level ground |
 //! | environment | `radiance`, `nits` of an image value of one |
 //!
-//! A point source of flux Φ has the intensity Φ/4π. A spot's falloff is that of
+//! A point source of flux Φ has the intensity Φ/4π, or Φ/π in the direction of one whose distribution is
+//! Lambert's. A spot's falloff is that of
 //! `KHR_lights_punctual`, t² with t rising linearly in the cosine from the outer to the inner angle,
 //! so that its flux is 2π (1 − cos inner + (cos inner − cos outer)/3) times its intensity.
 
 use super::document::Table;
 use super::error::SceneFileError;
 use super::settings::Settings;
+use super::sky::{Horizon, refuse_unless, sky};
 use super::value::Value;
-use crate::light::{Light, LightKind, Sky};
+use crate::light::{Light, LightKind};
 use crate::load::{LoadError, unique_name};
 use crate::material::Wrap;
 use crate::radiometry::{Intensity, Irradiance, Radiance, Rgb};
@@ -30,6 +32,8 @@ const POINT_KEYS: &[&str] = &[
     "name",
     "color",
     "position",
+    "distribution",
+    "direction",
     "candela",
     "lumens",
     "watts_per_steradian",
@@ -53,6 +57,10 @@ const DIRECTIONAL_KEYS: &[&str] = &[
     "name",
     "color",
     "direction",
+    "elevation",
+    "azimuth",
+    "up",
+    "north",
     "lux",
     "watts_per_square_metre",
 ];
@@ -61,7 +69,12 @@ const SKY_KEYS: &[&str] = &[
     "name",
     "color",
     "model",
+    "type",
+    "sun_elevation",
+    "sun_azimuth",
+    "ground_reflectance",
     "up",
+    "north",
     "radiance",
     "nits",
     "lux",
@@ -75,12 +88,20 @@ const ALL_KEYS: &[&str] = &[
     "name",
     "color",
     "position",
+    "distribution",
     "direction",
+    "elevation",
+    "azimuth",
     "inner_angle",
     "outer_angle",
     "model",
+    "type",
+    "sun_elevation",
+    "sun_azimuth",
+    "ground_reflectance",
     "image",
     "up",
+    "north",
     "rotation",
     "candela",
     "lumens",
@@ -93,7 +114,6 @@ const ALL_KEYS: &[&str] = &[
 ];
 const SOURCE_UNITS: &[&str] = &["candela", "lumens", "watts_per_steradian", "watts"];
 const IRRADIANCE_UNITS: &[&str] = &["lux", "watts_per_square_metre"];
-const SKY_UNITS: &[&str] = &["radiance", "nits", "lux", "watts_per_square_metre"];
 const RADIANCE_UNITS: &[&str] = &["radiance", "nits"];
 
 /// Reads a light and what it is counted in. An environment's image goes into `scene`.
@@ -116,7 +136,7 @@ pub(super) fn read(
     let (kind, units) = match kind {
         "point" => point(&table, settings)?,
         "spot" => spot(&table, settings)?,
-        "directional" => directional(&table)?,
+        "directional" => directional(&table, settings)?,
         "sky" => sky(&table, settings)?,
         _ => environment(&table, settings, scene, textures)?,
     };
@@ -131,13 +151,16 @@ pub(super) fn read(
 }
 
 /// The strength of a light in the unit of its key, coloured.
-struct Strength {
-    key: &'static str,
-    value: Rgb,
-    units: UnitSystem,
+pub(super) struct Strength {
+    pub(super) key: &'static str,
+    pub(super) value: Rgb,
+    pub(super) units: UnitSystem,
 }
 
-fn strength(table: &Table, keys: &'static [&'static str]) -> Result<Strength, SceneFileError> {
+pub(super) fn strength(
+    table: &Table,
+    keys: &'static [&'static str],
+) -> Result<Strength, SceneFileError> {
     let (key, value) = table.one_of(keys)?;
     let color = match table.get("color") {
         Some(color) => color.light()?,
@@ -159,7 +182,7 @@ fn position(table: &Table, settings: &Settings) -> Result<DVec3, SceneFileError>
     Ok(position.vector()? * settings.scale)
 }
 
-fn unit(value: &Value, key: &'static str) -> Result<DVec3, SceneFileError> {
+pub(super) fn unit(value: &Value, key: &'static str) -> Result<DVec3, SceneFileError> {
     value
         .vector()?
         .try_normalize()
@@ -175,7 +198,7 @@ fn direction(table: &Table) -> Result<DVec3, SceneFileError> {
     unit(&table.require("direction", example)?, "`direction`")
 }
 
-fn up(table: &Table, settings: &Settings) -> Result<DVec3, SceneFileError> {
+pub(super) fn up(table: &Table, settings: &Settings) -> Result<DVec3, SceneFileError> {
     table
         .get("up")
         .map_or(Ok(settings.up), |value| unit(&value, "`up`"))
@@ -189,13 +212,34 @@ fn intensity(strength: &Strength, solid_angle: f64) -> Intensity {
     })
 }
 
-type Read = (LightKind, UnitSystem);
+pub(super) type Read = (LightKind, UnitSystem);
 
 fn point(table: &Table, settings: &Settings) -> Result<Read, SceneFileError> {
     let strength = strength(table, SOURCE_UNITS)?;
-    let kind = LightKind::Point {
-        position: position(table, settings)?,
-        intensity: intensity(&strength, 4.0 * PI),
+    let position = position(table, settings)?;
+    let distribution = match table.get("distribution") {
+        Some(value) => value.choice(&["isotropic", "lambertian"])?,
+        None => "isotropic",
+    };
+    let kind = if distribution == "lambertian" {
+        LightKind::Lambertian {
+            position,
+            direction: direction(table)?,
+            // ∫ cos θ dω over the hemisphere.
+            intensity: intensity(&strength, PI),
+        }
+    } else {
+        if let Some(direction) = table.get("direction") {
+            return Err(SceneFileError::Needs {
+                place: direction.place(),
+                key: "direction",
+                needed: "distribution = \"lambertian\"",
+            });
+        }
+        LightKind::Point {
+            position,
+            intensity: intensity(&strength, 4.0 * PI),
+        }
     };
     Ok((kind, strength.units))
 }
@@ -224,37 +268,32 @@ fn spot(table: &Table, settings: &Settings) -> Result<Read, SceneFileError> {
     Ok((kind, strength.units))
 }
 
-fn directional(table: &Table) -> Result<Read, SceneFileError> {
+fn directional(table: &Table, settings: &Settings) -> Result<Read, SceneFileError> {
     let strength = strength(table, IRRADIANCE_UNITS)?;
+    let direction = match (table.get("direction"), table.get("elevation")) {
+        (Some(direction), Some(_)) => {
+            return Err(SceneFileError::Excludes {
+                place: direction.place(),
+                key: "direction",
+                other: "elevation",
+            });
+        }
+        (None, Some(_)) => {
+            let horizon = Horizon::read(table, settings)?;
+            -horizon.sun(table, "elevation", "azimuth")?
+        }
+        _ => {
+            for key in ["azimuth", "north"] {
+                refuse_unless(table, key, false, "elevation")?;
+            }
+            direction(table)?
+        }
+    };
     let kind = LightKind::Directional {
-        direction: direction(table)?,
+        direction,
         irradiance: Irradiance(strength.value),
     };
     Ok((kind, strength.units))
-}
-
-fn sky(table: &Table, settings: &Settings) -> Result<Read, SceneFileError> {
-    let example = "`model = \"uniform\"` or `model = \"cie-overcast\"`";
-    let model = table
-        .require("model", example)?
-        .choice(&["uniform", "cie-overcast"])?;
-    let strength = strength(table, SKY_UNITS)?;
-    // Irradiance on the ground over radiance: π under a uniform sky, and under the overcast sky
-    // 2π ∫ (1 + 2 sin γ)/3 sin γ cos γ dγ = 7π/9 times the zenith's.
-    let ground = match model {
-        "uniform" => PI,
-        _ => 7.0 * PI / 9.0,
-    };
-    let radiance = Radiance(match strength.key {
-        "lux" | "watts_per_square_metre" => strength.value / ground,
-        _ => strength.value,
-    });
-    let sky = match model {
-        "uniform" => Sky::Uniform { radiance },
-        _ => Sky::CieOvercast { zenith: radiance },
-    };
-    let up = up(table, settings)?;
-    Ok((LightKind::Sky { sky, up }, strength.units))
 }
 
 fn environment(

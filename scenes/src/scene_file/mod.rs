@@ -43,6 +43,7 @@ mod light;
 mod material;
 mod polygon;
 mod settings;
+mod sky;
 mod value;
 
 pub use error::SceneFileError;
@@ -182,8 +183,9 @@ fn adapt(part: &mut Part, settings: &Settings) {
         .iter_mut()
         .for_each(|vertex| *vertex *= scale);
     for light in &mut scene.lights {
-        if let LightKind::Point { position, .. } | LightKind::Spot { position, .. } =
-            &mut light.kind
+        if let LightKind::Point { position, .. }
+        | LightKind::Lambertian { position, .. }
+        | LightKind::Spot { position, .. } = &mut light.kind
         {
             *position *= scale;
         }

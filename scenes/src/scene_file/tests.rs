@@ -1,10 +1,10 @@
 use super::*;
 use crate::camera::FieldOfView;
 use crate::id::FaceId;
-use crate::light::Sky;
 use crate::load::{Loaded, load};
 use crate::material::{Sidedness, Specular};
 use crate::radiometry::{Intensity, Irradiance, Radiance, Rgb};
+use crate::sky::Sky;
 use glam::DVec3;
 use proptest::prelude::*;
 use std::f64::consts::PI;
@@ -259,9 +259,146 @@ fn suns_and_skies_are_read_in_both_systems() {
     let steps = 10_000;
     let ground: f64 = (0..steps)
         .map(|i| (f64::from(i) + 0.5) / f64::from(steps))
-        .map(|sine| overcast.radiance(sine).0.x * sine * 2.0 * PI / f64::from(steps))
+        .map(|sine| {
+            overcast
+                .radiance(DVec3::new((1.0 - sine * sine).sqrt(), sine, 0.0), DVec3::Y)
+                .0
+                .x
+                * sine
+                * 2.0
+                * PI
+                / f64::from(steps)
+        })
         .sum();
     assert!((ground / 10_000.0 - 1.0).abs() < 1e-6, "{ground}");
+}
+
+/// A Lambertian source of flux Φ has Φ/π in its direction.
+#[test]
+fn lambertian_sources_have_the_intensity_of_their_flux() {
+    let lines = "kind = \"point\"\ndistribution = \"lambertian\"\nposition = [0, 1, 0]\n\
+                 direction = [0, -2, 0]\nlumens = 100";
+    let LightKind::Lambertian {
+        direction,
+        intensity,
+        ..
+    } = light(lines)
+    else {
+        panic!("a Lambertian source");
+    };
+    assert_eq!(direction, -DVec3::Y);
+    assert_eq!(intensity, Intensity::splat(100.0 / PI));
+}
+
+/// East is +x, whichever of y and z is up, and the sun rises there.
+#[test]
+fn suns_stand_by_the_compass() {
+    let sun = |up: &str, azimuth: f64| {
+        let text = format!(
+            "[scene]\nup = \"{up}\"\n{FACE}[[light]]\nkind = \"directional\"\nelevation = 30\n\
+             azimuth = {azimuth}\nlux = 1\n"
+        );
+        match scene(&text).scene.lights[0].kind {
+            LightKind::Directional { direction, .. } => -direction,
+            ref other => panic!("a sun, not {other:?}"),
+        }
+    };
+    let cos = 30f64.to_radians().cos();
+    for (up, azimuth, expected) in [
+        ("z", 0.0, DVec3::new(0.0, cos, 0.5)),
+        ("z", 90.0, DVec3::new(cos, 0.0, 0.5)),
+        ("y", 0.0, DVec3::new(0.0, 0.5, -cos)),
+        ("y", 90.0, DVec3::new(cos, 0.5, 0.0)),
+    ] {
+        let error = (sun(up, azimuth) - expected).length();
+        assert!(error < 1e-15, "{up} {azimuth}: off by {error}");
+    }
+    let turned =
+        light("kind = \"directional\"\nelevation = 0\nazimuth = 0\nnorth = [1, 5, 0]\nlux = 1");
+    assert!(
+        matches!(turned, LightKind::Directional { direction, .. } if direction == DVec3::NEG_X)
+    );
+}
+
+/// Every model gives the level ground what the file says, and the ground its share of it.
+#[test]
+fn skies_light_the_ground_as_written() {
+    for model in [
+        "\"uniform\"",
+        "\"cie-overcast\"",
+        "\"cie-clear\"\nsun_elevation = 40\nsun_azimuth = 10",
+        "\"cie-general\"\ntype = 5",
+        "\"cie-general\"\ntype = 15\nsun_elevation = 20\nsun_azimuth = 0",
+    ] {
+        let lines = format!("kind = \"sky\"\nmodel = {model}\nlux = 800\nground_reflectance = 0.2");
+        let LightKind::Sky { sky, ground, .. } = light(&lines) else {
+            panic!("a sky");
+        };
+        // A few roundings.
+        let level = sky.ground_irradiance().0;
+        assert!((level / 800.0 - Rgb::ONE).length() < 1e-14, "{model}");
+        assert!(
+            (ground.0 * PI / 160.0 - Rgb::ONE).length() < 1e-14,
+            "{model}"
+        );
+    }
+}
+
+#[test]
+fn keys_of_suns_and_skies_that_have_no_effect_are_refused() {
+    for (lines, expected) in [
+        (
+            "kind = \"sky\"\nmodel = \"cie-general\"\nlux = 1",
+            "has no `type`",
+        ),
+        (
+            "kind = \"sky\"\nmodel = \"cie-general\"\ntype = 16\nlux = 1",
+            "from 1 to 15",
+        ),
+        (
+            "kind = \"sky\"\nmodel = \"cie-general\"\ntype = 1.5\nlux = 1",
+            "from 1 to 15",
+        ),
+        (
+            "kind = \"sky\"\nmodel = \"cie-clear\"\nlux = 1",
+            "has no `sun_elevation`",
+        ),
+        (
+            "kind = \"sky\"\nmodel = \"cie-clear\"\nsun_elevation = -1\nsun_azimuth = 0\nlux = 1",
+            "from 0 to 90 degrees",
+        ),
+        (
+            "kind = \"sky\"\nmodel = \"uniform\"\ntype = 3\nlux = 1",
+            "`type` needs",
+        ),
+        (
+            "kind = \"sky\"\nmodel = \"cie-overcast\"\nsun_azimuth = 3\nlux = 1",
+            "`sun_azimuth` needs",
+        ),
+        (
+            "kind = \"sky\"\nmodel = \"uniform\"\nground_reflectance = 1\nlux = 1",
+            "at least 0 and below 1",
+        ),
+        (
+            "kind = \"directional\"\ndirection = [1, 0, 0]\nelevation = 3\nlux = 1",
+            "cannot stand beside",
+        ),
+        (
+            "kind = \"directional\"\ndirection = [1, 0, 0]\nazimuth = 3\nlux = 1",
+            "needs `elevation`",
+        ),
+        (
+            "kind = \"directional\"\nelevation = 3\nazimuth = 3\nnorth = [0, 1, 0]\nlux = 1",
+            "`north` has no direction",
+        ),
+        (
+            "kind = \"point\"\nposition = [0, 0, 0]\ndirection = [0, 0, 1]\nlumens = 1",
+            "`direction` needs",
+        ),
+    ] {
+        let error = try_scene(&format!("{FACE}[[light]]\n{lines}\n")).expect_err(lines);
+        assert!(error.contains(expected), "{lines}: {error}");
+    }
 }
 
 #[test]

@@ -23,6 +23,7 @@ use glam::{DVec3, Vec3};
 use luxel_scenes::check::FaceRef;
 use luxel_scenes::{Light, LightKind};
 use rayon::prelude::*;
+use std::f64::consts::FRAC_PI_2;
 use tally::{Met, Tally, met};
 
 /// Points on all faces together, spread by area. Fewer, and objects of a ten-thousandth of the
@@ -147,6 +148,11 @@ fn eye_on_face(world: &World, view: &View) -> Option<Finding> {
 fn inside_light(world: &World, light: &Light) -> Option<Finding> {
     let (position, cone) = match light.kind {
         LightKind::Point { position, .. } => (position, None),
+        LightKind::Lambertian {
+            position,
+            direction,
+            ..
+        } => (position, Some((direction, FRAC_PI_2))),
         LightKind::Spot {
             position,
             direction,

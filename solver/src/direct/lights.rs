@@ -5,7 +5,7 @@ use crate::geometry::Geometry;
 use crate::patches::Side;
 use crate::surface::Surfaces;
 use glam::DVec3;
-use luxel_scenes::{FaceId, LightKind, Radiance, Rgb, Sidedness};
+use luxel_scenes::{FaceId, LightKind, Radiance, Rgb, Scene, Sidedness};
 
 use super::kernel::Luminaire;
 use super::merge::merge;
@@ -30,16 +30,15 @@ pub enum Source {
         /// Radiance L in W/(m² sr).
         radiance: Radiance,
     },
-    /// A point source; a spot when `cone` is given.
+    /// A point source.
     Point {
         /// Position in the unit frame.
         position: DVec3,
         /// Intensity in W/sr, divided by the square of the metres in a unit: the irradiance in
         /// W/m² at a distance of one unit.
         intensity: Rgb,
-        /// Direction of a spot, and the scale and offset that map the cosine from its axis to the
-        /// square root of its falloff (`KHR_lights_punctual`).
-        cone: Option<(DVec3, f64, f64)>,
+        /// How the intensity depends on the direction.
+        distribution: Distribution,
     },
     /// Parallel light.
     Directional {
@@ -48,6 +47,45 @@ pub enum Source {
         /// Irradiance in W/m² on a surface facing the light.
         irradiance: Rgb,
     },
+}
+
+/// How the intensity of a point source depends on the direction in which it shines.
+#[derive(Clone, Copy, Debug)]
+pub enum Distribution {
+    /// Not at all.
+    Isotropic,
+    /// By the cosine from the axis: Lambert's law.
+    Lambertian {
+        /// Unit vector.
+        axis: DVec3,
+    },
+    /// As `KHR_lights_punctual` has it: the square of a linear function of the cosine from the axis,
+    /// clamped to [0, 1].
+    Spot {
+        /// Unit vector.
+        axis: DVec3,
+        /// Factor on the cosine.
+        scale: f64,
+        /// What is added to it.
+        offset: f64,
+    },
+}
+
+impl Distribution {
+    /// Intensity in a unit direction over that of the axis.
+    fn relative(&self, direction: DVec3) -> f64 {
+        match *self {
+            Self::Isotropic => 1.0,
+            Self::Lambertian { axis } => direction.dot(axis).max(0.0),
+            Self::Spot {
+                axis,
+                scale,
+                offset,
+            } => (direction.dot(axis) * scale + offset)
+                .clamp(0.0, 1.0)
+                .powi(2),
+        }
+    }
 }
 
 impl Source {
@@ -61,7 +99,7 @@ impl Source {
             Self::Point {
                 position: source,
                 intensity,
-                cone,
+                distribution,
             } => {
                 let to = *source - position;
                 let distance_squared = to.length_squared();
@@ -69,10 +107,7 @@ impl Source {
                 if cosine.is_nan() || cosine <= 0.0 {
                     return Rgb::ZERO;
                 }
-                let falloff = cone.map_or(1.0, |(axis, scale, offset)| {
-                    let cosine = -to.dot(axis) / distance_squared.sqrt();
-                    (cosine * scale + offset).clamp(0.0, 1.0).powi(2)
-                });
+                let falloff = distribution.relative(-to / distance_squared.sqrt());
                 *intensity * (falloff * cosine / distance_squared)
             }
             Self::Directional {
@@ -89,7 +124,7 @@ pub struct Lights {
     /// The source that the front of each face belongs to, if any.
     front_source: Vec<Option<u32>>,
     sky: Option<SkyDome>,
-    are_found_by_rays: bool,
+    has_unlisted_emission: bool,
 }
 
 impl Lights {
@@ -143,54 +178,16 @@ impl Lights {
                 radiance,
             });
         }
-        let frame = geometry.frame();
-        let per_square_unit = 1.0 / (frame.metres_per_unit * frame.metres_per_unit);
-        for light in &scene.lights {
-            match &light.kind {
-                LightKind::Point {
-                    position,
-                    intensity,
-                } => sources.push(Source::Point {
-                    position: frame.to_unit(*position),
-                    intensity: intensity.0 * per_square_unit,
-                    cone: None,
-                }),
-                LightKind::Spot {
-                    position,
-                    direction,
-                    intensity,
-                    inner_angle,
-                    outer_angle,
-                } => {
-                    let scale = 1.0 / (inner_angle.cos() - outer_angle.cos()).max(1e-3);
-                    sources.push(Source::Point {
-                        position: frame.to_unit(*position),
-                        intensity: intensity.0 * per_square_unit,
-                        cone: Some((*direction, scale, -outer_angle.cos() * scale)),
-                    });
-                }
-                LightKind::Directional {
-                    direction,
-                    irradiance,
-                } => {
-                    sources.push(Source::Directional {
-                        towards: -*direction,
-                        irradiance: irradiance.0,
-                    });
-                }
-                LightKind::Sky { .. } | LightKind::Environment { .. } => {}
-            }
-        }
+        sources.extend(lamps(scene, geometry));
         let sky = SkyDome::new(scene);
-        let are_found_by_rays = sky.is_some()
-            || scene.face_ids().any(|face| {
-                surfaces.material(face).is_emissive() && front_source[face.index()].is_none()
-            });
+        let has_unlisted_emission = scene.face_ids().any(|face| {
+            surfaces.material(face).is_emissive() && front_source[face.index()].is_none()
+        });
         Self {
             sources,
             front_source,
             sky,
-            are_found_by_rays,
+            has_unlisted_emission,
         }
     }
 
@@ -224,7 +221,17 @@ impl Lights {
     /// True when some direct light does not come from [`Self::sources`]: a sky, textured emission,
     /// emissive faces beyond the brightest. Rays from the receiver find it.
     pub fn are_found_by_rays(&self) -> bool {
-        self.are_found_by_rays
+        self.has_sky() || self.has_unlisted_emission
+    }
+
+    /// Whether light comes from outside the scene.
+    pub fn has_sky(&self) -> bool {
+        self.sky.is_some()
+    }
+
+    /// Whether there is emission that is not one of [`Self::sources`].
+    pub fn has_unlisted_emission(&self) -> bool {
+        self.has_unlisted_emission
     }
 }
 
@@ -236,6 +243,60 @@ struct EmissivePolygon {
     flux: f64,
     two_sided: bool,
     faces: Vec<FaceId>,
+}
+
+/// The lights that are no surfaces and have a place or a direction.
+fn lamps<'s>(scene: &'s Scene, geometry: &'s Geometry) -> impl Iterator<Item = Source> + 's {
+    let frame = geometry.frame();
+    let per_square_unit = 1.0 / (frame.metres_per_unit * frame.metres_per_unit);
+    scene
+        .lights
+        .iter()
+        .filter_map(move |light| match &light.kind {
+            LightKind::Point {
+                position,
+                intensity,
+            } => Some(Source::Point {
+                position: frame.to_unit(*position),
+                intensity: intensity.0 * per_square_unit,
+                distribution: Distribution::Isotropic,
+            }),
+            LightKind::Lambertian {
+                position,
+                direction,
+                intensity,
+            } => Some(Source::Point {
+                position: frame.to_unit(*position),
+                intensity: intensity.0 * per_square_unit,
+                distribution: Distribution::Lambertian { axis: *direction },
+            }),
+            LightKind::Spot {
+                position,
+                direction,
+                intensity,
+                inner_angle,
+                outer_angle,
+            } => {
+                let scale = 1.0 / (inner_angle.cos() - outer_angle.cos()).max(1e-3);
+                Some(Source::Point {
+                    position: frame.to_unit(*position),
+                    intensity: intensity.0 * per_square_unit,
+                    distribution: Distribution::Spot {
+                        axis: *direction,
+                        scale,
+                        offset: -outer_angle.cos() * scale,
+                    },
+                })
+            }
+            LightKind::Directional {
+                direction,
+                irradiance,
+            } => Some(Source::Directional {
+                towards: -*direction,
+                irradiance: irradiance.0,
+            }),
+            LightKind::Sky { .. } | LightKind::Environment { .. } => None,
+        })
 }
 
 /// The emissive faces, merged to as few convex polygons as possible, in the order of the file.

@@ -2,14 +2,17 @@
 //!
 //! Emissive polygons are integrated exactly (Lambert's formula) and multiplied by a visibility
 //! that is sampled by the same kernel; point, spot and directional lights cost one shadow ray; the
-//! sky is seen by the rays of rows and gathers that leave the scene.
+//! sky is integrated by rays of its own where a receiver has many, and else seen by the rays of rows
+//! and gathers that leave the scene.
 
+mod dome;
 mod kernel;
 mod lights;
 mod merge;
 mod sampler;
 mod sky;
 
+pub(crate) use dome::{Dome, DomeRays};
 pub use kernel::Luminaire;
-pub use lights::{Lights, Source};
+pub use lights::{Distribution, Lights, Source};
 pub use sampler::{DirectSampler, Sample, ShadowRays};

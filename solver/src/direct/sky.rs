@@ -13,6 +13,7 @@ enum Layer {
     Formula {
         sky: Sky,
         up: DVec3,
+        ground: Radiance,
     },
     Image {
         texture: TextureId,
@@ -29,7 +30,11 @@ impl SkyDome {
             .lights
             .iter()
             .filter_map(|light| match &light.kind {
-                LightKind::Sky { sky, up } => Some(Layer::Formula { sky: *sky, up: *up }),
+                LightKind::Sky { sky, up, ground } => Some(Layer::Formula {
+                    sky: *sky,
+                    up: *up,
+                    ground: *ground,
+                }),
                 LightKind::Environment {
                     texture,
                     scale,
@@ -52,7 +57,8 @@ impl SkyDome {
         self.layers
             .iter()
             .map(|layer| match layer {
-                Layer::Formula { sky, up } => sky.radiance(direction.dot(*up)),
+                Layer::Formula { up, ground, .. } if direction.dot(*up) < 0.0 => *ground,
+                Layer::Formula { sky, up, .. } => sky.radiance(direction, *up),
                 Layer::Image {
                     texture,
                     scale,

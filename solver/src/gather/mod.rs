@@ -18,10 +18,10 @@
 
 mod near_chain;
 
-use crate::direct::{DirectSampler, Sample, ShadowRays};
+use crate::direct::{DirectSampler, Dome, DomeRays, Sample, ShadowRays};
 use crate::patches::Patches;
 use crate::radiosity::RadiositySolution;
-use crate::sampling::{Sequence, Stage};
+use crate::sampling::{Sequence, Stage, hash};
 use crate::world::{Receiver, World};
 use luxel_scenes::{Irradiance, Rgb};
 use near_chain::Chains;
@@ -29,6 +29,12 @@ use rayon::prelude::*;
 
 /// Rays that a parallel task aims at, so that batches are long even for few rays a receiver.
 const RAYS_PER_TASK: usize = 4096;
+
+/// Rays of a receiver from which the sky gets as many of its own: a tuned value. With fewer, the rays
+/// that leave the scene anyway tell more of it, and cost nothing. Largest relative errors of the two at
+/// 1024, 4096, 16 384 and 65 536 rays: below a roof opening 5.1 and 2.5, 0.8 and 0.9, 0.14 and
+/// 0.22, 0.015 and 0.11 %; behind a small window 9 and 29, 1.3 and 5.7, 0.23 and 1.9, 0.06 and 0.8 %.
+const SKY_APART: usize = 8192;
 
 /// Which light to gather.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +50,7 @@ pub enum Components {
 /// How much to spend on a receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GatherConfig {
-    /// Rays for indirect light, over all replicates.
+    /// Rays for indirect light, over all replicates; if they are many, as many again for the sky.
     pub rays: usize,
     /// Shadow rays for direct light, over all replicates.
     pub shadow_rays: usize,
@@ -118,6 +124,10 @@ pub fn gather(
         "between one and {MAX_REPLICATES} replicates"
     );
     let wants_indirect = config.components != Components::Direct;
+    let wants_direct = config.components != Components::Indirect;
+    let lights = world.lights();
+    let sky_is_apart = lights.has_sky() && config.rays >= SKY_APART;
+    let rays_find_direct = lights.has_unlisted_emission() || lights.has_sky() && !sky_is_apart;
     assert!(
         !wants_indirect || solutions.len() == replicates,
         "one solution for each replicate"
@@ -129,9 +139,12 @@ pub fn gather(
         .flat_map_iter(|(receivers, keys)| {
             let mut totals = vec![Totals::default(); receivers.len()];
             let mut direct = DirectSampler::new(world.lights(), world.bvh());
-            let mut chains = Chains::new(world, patches);
+            let mut chains = Chains::new(world, patches, sky_is_apart);
+            if sky_is_apart && wants_direct {
+                add_sky(world, receivers, keys, config, &mut totals);
+            }
             for replicate in 0..replicates {
-                if config.components != Components::Indirect {
+                if wants_direct {
                     let rays = share(config.shadow_rays, replicates, replicate);
                     add_direct(
                         &mut direct,
@@ -143,13 +156,13 @@ pub fn gather(
                         &mut totals,
                     );
                 }
-                if wants_indirect || world.lights().are_found_by_rays() {
+                if wants_indirect || rays_find_direct {
                     let rays = share(config.rays, replicates, replicate);
                     let seed = replicate_seed(config.seed, replicate);
                     let solution = solutions.get(replicate).filter(|_| wants_indirect);
                     chains.gather(solution, receivers, keys, seed, rays, |slot, found| {
                         let total = &mut totals[slot];
-                        if config.components != Components::Indirect {
+                        if wants_direct {
                             total.direct[replicate] += found.direct / rays as f64;
                         }
                         total.indirect[replicate] += found.indirect / rays as f64;
@@ -175,7 +188,7 @@ fn share(total: usize, parts: usize, index: usize) -> usize {
 
 /// Replicates draw from sequences of their own.
 fn replicate_seed(seed: u64, replicate: usize) -> u64 {
-    crate::sampling::hash::mix64(seed ^ crate::sampling::hash::mix64(replicate as u64))
+    hash::mix64(seed ^ hash::mix64(replicate as u64))
 }
 
 /// What a receiver has collected, by replicate.
@@ -206,6 +219,33 @@ impl Totals {
             standard_error: Irradiance((scatter / (degrees * count)).map(f64::sqrt)),
             back_fraction: self.backs as f64 / self.rays.max(1) as f64,
         }
+    }
+}
+
+/// Adds the light of the sky by rays of its own.
+fn add_sky(
+    world: &World,
+    receivers: &[Receiver],
+    keys: &[Key],
+    config: &GatherConfig,
+    totals: &mut [Totals],
+) {
+    let mut dome = Dome::new(world.lights(), world.surfaces(), world.bvh());
+    let seeds = |index: u32| {
+        let seed = hash::mix64(config.seed ^ u64::from(index));
+        move |replicate| replicate_seed(seed, replicate)
+    };
+    for ((receiver, key), total) in receivers.iter().zip(keys).zip(totals) {
+        let replicate_seeds: Vec<u64> = (0..config.replicates).map(seeds(key.index)).collect();
+        let rays = DomeRays {
+            count: config.rays,
+            seed: seeds(key.index)(usize::MAX),
+            replicate_seeds: &replicate_seeds,
+            item: key.item,
+        };
+        dome.irradiance(receiver, &rays, |replicate, irradiance| {
+            total.direct[replicate] += irradiance;
+        });
     }
 }
 

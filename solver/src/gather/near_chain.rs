@@ -39,7 +39,8 @@ struct Path {
 /// What the rays of a receiver found, as sums of B over them.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Found {
-    /// Light of sources that shadow rays do not reach: the sky, emission beyond the exact sources.
+    /// Light of sources that shadow rays do not reach: the sky unless it is integrated apart, emission
+    /// beyond the exact sources.
     pub(super) direct: Rgb,
     /// Reflected light.
     pub(super) indirect: Rgb,
@@ -62,6 +63,8 @@ impl Found {
 pub(super) struct Chains<'a> {
     world: &'a World<'a>,
     patches: &'a Patches,
+    /// Whether receivers get the light of the sky by other rays.
+    sky_is_apart: bool,
     direct: DirectSampler<'a>,
     paths: Vec<Path>,
     rays: Vec<Ray>,
@@ -69,10 +72,11 @@ pub(super) struct Chains<'a> {
 }
 
 impl<'a> Chains<'a> {
-    pub(super) fn new(world: &'a World<'a>, patches: &'a Patches) -> Self {
+    pub(super) fn new(world: &'a World<'a>, patches: &'a Patches, sky_is_apart: bool) -> Self {
         Self {
             world,
             patches,
+            sky_is_apart,
             direct: DirectSampler::new(world.lights(), world.bvh()),
             paths: Vec::new(),
             rays: Vec::new(),
@@ -141,6 +145,9 @@ impl<'a> Chains<'a> {
         for ((path, ray), hit) in self.paths.iter().zip(&self.rays).zip(&self.hits) {
             let found = &mut found[path.receiver as usize];
             let Some(interaction) = self.world.interaction(ray, hit) else {
+                if link == 0 && self.sky_is_apart {
+                    continue;
+                }
                 let sky = lights.sky(surfaces, ray.direction.as_dvec3());
                 *found.emitted(link) += path.throughput * sky.to_irradiance().0;
                 continue;

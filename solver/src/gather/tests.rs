@@ -173,6 +173,7 @@ fn a_uniform_sky_fills_the_hemisphere() {
                 radiance: Radiance::splat(2.0),
             },
             up: DVec3::Y,
+            ground: Radiance::ZERO,
         },
     });
     let points = [

@@ -36,4 +36,6 @@ impl Stage {
     pub const PATCHES: Self = Self(13);
     /// Points, eyes and lights that look for backs of faces.
     pub const AUDIT: Self = Self(15);
+    /// Directions to the sky.
+    pub const SKY: Self = Self(16);
 }
