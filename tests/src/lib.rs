@@ -7,6 +7,7 @@
 pub mod builder;
 pub mod cases;
 pub mod chi_squared;
+pub mod cie171;
 pub mod command;
 pub mod golden;
 pub mod hypothesis;

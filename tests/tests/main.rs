@@ -3,6 +3,7 @@
 mod agreement;
 mod ambient_occlusion;
 mod bad_input;
+mod cie171;
 mod determinism;
 mod enclosures;
 mod form_factors;
