@@ -13,5 +13,6 @@ mod irradiance_fields;
 mod ray_cast;
 mod references;
 mod sampling;
+mod solvers;
 mod specular;
 mod stress_rays;

@@ -6,13 +6,15 @@ use crate::progress::Progress;
 use clap::ValueEnum;
 use luxel_scenes::{Irradiance, Rgb};
 use luxel_solver::form_factors::{
-    AnalyticConfig, HemicubeConfig, RayCastConfig, analytic_factors, hemicube_factors, ray_cast,
+    AnalyticConfig, HemicubeConfig, RayCastConfig, Repair, Target, analytic_factors,
+    hemicube_factors, ray_cast, repair,
 };
-use luxel_solver::patches::Patches;
+use luxel_solver::patches::{PatchId, Patches};
 use luxel_solver::solvers::{
-    Config, Ledger, Solution, System, Tolerance, direct, gauss_seidel, jacobi, no_progress, source,
+    Ambient, Config, Ledger, Solution, System, SystemError, Tolerance, conjugate_gradient, direct,
+    gauss_seidel, jacobi, no_progress, source, southwell,
 };
-use luxel_solver::transport::Dense;
+use luxel_solver::transport::{Dense, Symmetrised, Transport};
 use luxel_solver::world::World;
 
 /// Patches up to which a dense matrix is made: 16 bytes for each pair, 1 GiB.
@@ -43,6 +45,11 @@ pub(super) enum Solver {
     Jacobi,
     /// Sweeps that use each new value at once
     GaussSeidel,
+    /// Progressive shooting: the largest unshot flux first
+    Southwell,
+    /// Conjugate gradient, for bright rooms; it makes form factors of rays and hemicubes reciprocal
+    #[value(name = "cg")]
+    ConjugateGradient,
     /// LU factors, for up to a few thousand patches
     Direct,
 }
@@ -51,6 +58,9 @@ pub(super) enum Solver {
 pub(super) struct DenseSolution {
     pub(super) solution: Solution,
     pub(super) ledger: Ledger,
+    /// Bound on the root mean square of the error that the solver leaves, in W/m²; `None` when the
+    /// form factors are not reciprocal.
+    pub(super) mean_error_bound: Option<Rgb>,
     /// Standard error of each patch's irradiance in W/m², from that of its form factors.
     pub(super) standard_error: Vec<Irradiance>,
 }
@@ -76,23 +86,32 @@ pub(super) fn solve(
         ));
     }
     let n = patches.len();
-    let (transport, errors) = compute(world, patches, factors, context)?;
-
-    let no_lights = vec![Irradiance::ZERO; n];
-    let sources = source(patches.emissions(), patches.reflectances(), &no_lights);
-    let system = System::new(&transport, patches.reflectances(), &sources)?;
-    let solution = match solver {
-        Solver::Jacobi => jacobi(&system, config, no_progress),
-        Solver::GaussSeidel => gauss_seidel(&system, config, no_progress),
-        Solver::Direct => direct(&system)?,
-    };
+    let (dense, errors) = compute(world, patches, factors, context)?;
     let frame = world.surfaces().geometry().frame();
     let areas: Vec<f64> = patches
         .areas()
         .iter()
         .map(|&area| frame.area_to_world(area))
         .collect();
-    let ledger = Ledger::new(&system, &solution, &areas, patches.emissions(), &no_lights);
+    let is_analytic = matches!(factors, Factors::Analytic(_));
+    let transport: Box<dyn Transport> = if solver == Solver::ConjugateGradient && !is_analytic {
+        reciprocal(&dense, &areas)
+    } else {
+        Box::new(dense)
+    };
+
+    let no_lights = vec![Irradiance::ZERO; n];
+    let sources = source(patches.emissions(), patches.reflectances(), &no_lights);
+    let system = System::new(&*transport, &areas, patches.reflectances(), &sources)
+        .map_err(|error| refused(world, patches, &error))?;
+    let solution = match solver {
+        Solver::Jacobi => jacobi(&system, config, no_progress),
+        Solver::GaussSeidel => gauss_seidel(&system, config, no_progress),
+        Solver::Southwell => southwell(&system, Ambient::None, config, no_progress),
+        Solver::ConjugateGradient => conjugate_gradient(&system, config, no_progress)?,
+        Solver::Direct => direct(&system)?,
+    };
+    let ledger = Ledger::new(&system, &solution, patches.emissions(), &no_lights);
     let standard_error = errors
         .chunks(n.max(1))
         .map(|row| {
@@ -104,11 +123,55 @@ pub(super) fn solve(
             Irradiance(squares.map(f64::sqrt))
         })
         .collect();
+    let mean_error_bound = system.mean_error_bound(&solution).ok();
     Ok(DenseSolution {
         solution,
         ledger,
+        mean_error_bound,
         standard_error,
     })
+}
+
+/// Form factors that obey A_i F_ij = A_j F_ji next to those of rays or hemicubes: with the same row sums
+/// where there are such, as in rooms, else with those that come out.
+fn reciprocal(factors: &Dense, areas: &[f64]) -> Box<dyn Transport> {
+    /// What row sums may differ by: rounding of a thousand entries is not far below.
+    const ROW_SUMS: f64 = 1e-12;
+    let sums: Vec<f64> = (0..areas.len()).map(|row| factors.row_sum(row)).collect();
+    let how = Repair {
+        target: Target::RowSums(&sums),
+        max_defect: 0.0,
+        tolerance: ROW_SUMS,
+    };
+    match repair(factors, areas, &how) {
+        Ok(repaired) => Box::new(repaired),
+        Err(_) => Box::new(Symmetrised::new(factors, areas)),
+    }
+}
+
+/// Names the object whose patch makes a system unsolvable.
+fn refused(world: &World<'_>, patches: &Patches, error: &SystemError) -> Failure {
+    let scene = world.scene();
+    let text = match *error {
+        SystemError::NotContracting {
+            channel,
+            unknown,
+            gain,
+        } => {
+            let (faces, _) = patches.faces(PatchId::new(unknown));
+            let object = scene.faces[faces[0].index()].object;
+            format!(
+                "{}: object {:?} reflects {gain} times the {} light that it sends: its reflectance \
+                 is too near to 1 for the accuracy of the form factors; give more --rays or a lower \
+                 reflectance",
+                scene.name,
+                scene.objects[object.index()].name,
+                ["red", "green", "blue"][channel],
+            )
+        }
+        _ => format!("{}: {error}", scene.name),
+    };
+    Failure::new(ExitCode::InvalidInput, text)
 }
 
 /// Form factors between patches with their standard errors, row-major.

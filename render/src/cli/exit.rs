@@ -87,6 +87,7 @@ exits_with! {
     luxel_solver::patches::MeshError => InvalidInput,
     luxel_solver::solvers::SystemError => InvalidInput,
     luxel_solver::solvers::DirectError => Failure,
+    luxel_solver::solvers::NotReciprocal => InvalidInput,
     crate::ply::TooManyCorners => Failure,
     csv::Error => Failure,
     std::io::Error => Failure,

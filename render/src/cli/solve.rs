@@ -94,6 +94,9 @@ struct Energy {
 struct Error {
     /// Bound on what the iteration leaves, over the brightest patch.
     solver: f64,
+    /// Bound on the root mean square of the same, over the mean radiosity; `None` where form factors
+    /// are not reciprocal.
+    solver_rms: Option<f64>,
     /// Standard error of the irradiance, root mean square over mean; `None` for hemicubes, whose
     /// error is a bias.
     sampling: Option<f64>,
@@ -192,6 +195,7 @@ impl Solve {
             ),
             error: Error {
                 solver: largest(|solution| solution.error_bound).max_element() / light.brightest(),
+                solver_rms: None,
                 sampling: Some(sampling_error(&each)),
             },
             converged: solutions.iter().all(|s| s.outcome == Outcome::Converged),
@@ -220,6 +224,7 @@ impl Solve {
         let DenseSolution {
             solution,
             ledger,
+            mean_error_bound,
             standard_error,
         } = solved;
         let light = PatchLight::new(&patches, solution.irradiance);
@@ -238,6 +243,10 @@ impl Solve {
             .sum();
         let area: f64 = patches.areas().iter().sum();
         let sampling = (squares / area).sqrt() / (level / area);
+        let leaving: f64 = (patches.areas().iter().zip(&light.radiosity))
+            .map(|(area, radiosity)| area * radiosity.0.element_sum() / 3.0)
+            .sum();
+        let solver_rms = mean_error_bound.map(|bound| bound.max_element() / (leaving / area));
         Ok(Report {
             patches: patches.len(),
             objects: light.by_object(world, &patches),
@@ -252,6 +261,7 @@ impl Solve {
             },
             error: Error {
                 solver: solution.error_bound.max_element() / light.brightest(),
+                solver_rms,
                 sampling: (method != Method::Hemicube && level > 0.0).then_some(sampling),
             },
             converged: solution.outcome == Outcome::Converged,
@@ -335,6 +345,7 @@ impl Report {
             },
             "error": {
                 "solver": self.error.solver,
+                "solver_rms": self.error.solver_rms,
                 "sampling": self.error.sampling,
             },
             "output": output.map(|path| path.display().to_string()),

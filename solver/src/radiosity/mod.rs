@@ -138,8 +138,6 @@ pub fn solve(
         .zip(&gathered)
         .map(|((&rho, &direct), &emission)| emission + rho * direct)
         .collect();
-    let system = System::new(&cast.rows, &reflectance, &source)?;
-    let solution = solvers::jacobi(&system, &config.solver, solvers::no_progress);
     let frame = world.surfaces().geometry().frame();
     let areas: Vec<f64> = (0..patches.len())
         .flat_map(|index| {
@@ -150,7 +148,9 @@ pub fn solve(
             weights.map(|weight| area * weight / total)
         })
         .collect();
-    let ledger = Ledger::new(&system, &solution, &areas, &gathered, &cast.direct);
+    let system = System::new(&cast.rows, &areas, &reflectance, &source)?;
+    let solution = solvers::jacobi(&system, &config.solver, solvers::no_progress);
+    let ledger = Ledger::new(&system, &solution, &gathered, &cast.direct);
     let irradiance = solution
         .irradiance
         .iter()

@@ -38,4 +38,6 @@ impl Stage {
     pub const AUDIT: Self = Self(15);
     /// Directions to the sky.
     pub const SKY: Self = Self(16);
+    /// Signs that test operators for reciprocity.
+    pub const RECIPROCITY: Self = Self(17);
 }

@@ -87,7 +87,7 @@ mod tests {
         let dense = Dense::new(2, vec![0.0, f, f, 0.0]).expect("a valid matrix");
         let rho = [Reflectance::new(0.5, 0.5, 0.0), Reflectance::splat(0.25)];
         let s = [Radiosity::splat(4.0), Radiosity::ZERO];
-        let system = System::new(&dense, &rho, &s).expect("a valid system");
+        let system = System::new(&dense, &[1.0; 2], &rho, &s).expect("a valid system");
         let solution = direct(&system).expect("a regular matrix");
         let b1 = 4.0 / (1.0 - 0.5 * 0.25 * f * f);
         let expected = [Rgb::new(b1, b1, 4.0), Rgb::new(b1, b1, 4.0) * 0.25 * f];
@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn an_empty_system_has_an_empty_solution() {
         let dense = Dense::new(0, Vec::new()).expect("an empty matrix");
-        let system = System::new(&dense, &[], &[]).expect("a valid system");
+        let system = System::new(&dense, &[], &[], &[]).expect("a valid system");
         let solution = direct(&system).expect("nothing to invert");
         assert!(solution.radiosity.is_empty(), "no unknowns");
     }

@@ -92,7 +92,7 @@ mod tests {
         ];
         let mut s = [Radiosity::ZERO; 5];
         s[1] = Radiosity::new(1.0, 2.0, 3.0);
-        let system = System::new(&dense, &rho, &s).expect("a valid system");
+        let system = System::new(&dense, &[1.0; 5], &rho, &s).expect("a valid system");
         let mut last = s.to_vec();
         for max_iterations in 1..60 {
             let config = Config {
@@ -116,7 +116,7 @@ mod tests {
         let dense = closed();
         let rho = [Reflectance::splat(0.5); 5];
         let s = [Radiosity::splat(1.0); 5];
-        let system = System::new(&dense, &rho, &s).expect("a valid system");
+        let system = System::new(&dense, &[1.0; 5], &rho, &s).expect("a valid system");
         let config = Config {
             tolerance: Tolerance::Residual(1e-6),
             max_iterations: 100,
@@ -140,7 +140,7 @@ mod tests {
         let dense = closed();
         let rho = [Reflectance::new(0.8, 0.0, 0.8); 5];
         let s = [0.1, 0.2, 0.3, 0.4, 0.7].map(Radiosity::splat);
-        let system = System::new(&dense, &rho, &s).expect("a valid system");
+        let system = System::new(&dense, &[1.0; 5], &rho, &s).expect("a valid system");
         let config = Config {
             tolerance: Tolerance::Error(1e-9),
             max_iterations: 1000,
@@ -157,7 +157,7 @@ mod tests {
         let dense = closed();
         let rho = [Reflectance::splat(0.9); 5];
         let s = [Radiosity::splat(1.0); 5];
-        let system = System::new(&dense, &rho, &s).expect("a valid system");
+        let system = System::new(&dense, &[1.0; 5], &rho, &s).expect("a valid system");
         let config = Config {
             tolerance: Tolerance::Error(1e-9),
             max_iterations: 1000,

@@ -37,20 +37,18 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// The ledger of a solution. `areas` in m², `emission` M and `direct` E^direct in W/m² of each
-    /// unknown; the system's source must be S = M + ρ E^direct.
+    /// The ledger of a solution. `emission` M and `direct` E^direct in W/m² of each unknown; the
+    /// system's source must be S = M + ρ E^direct.
     ///
     /// # Panics
     /// When a slice does not have one element per unknown.
     pub fn new(
         system: &System,
         solution: &Solution,
-        areas: &[f64],
         emission: &[Exitance],
         direct: &[Irradiance],
     ) -> Self {
         let n = system.len();
-        assert_eq!(areas.len(), n, "one area per unknown");
         assert_eq!(emission.len(), n, "one emission per unknown");
         assert_eq!(direct.len(), n, "one direct irradiance per unknown");
         let mut ledger = Self {
@@ -63,7 +61,7 @@ impl Ledger {
         };
         let residuals = system.residuals(&solution.radiosity, &solution.irradiance);
         for (i, r) in residuals.enumerate() {
-            let area = areas[i];
+            let area = system.areas()[i];
             let Reflectance(rho) = system.reflectance()[i];
             let b = solution.radiosity[i].0;
             let e = solution.irradiance[i].0;
@@ -120,14 +118,14 @@ mod tests {
         let emission: Vec<_> = (0..n).map(|k| Exitance::splat((k % 3) as f64)).collect();
         let direct: Vec<_> = (0..n).map(|k| Irradiance::splat((k % 2) as f64)).collect();
         let s = source(&emission, &rho, &direct);
-        let system = System::new(&dense, &rho, &s).expect("a valid system");
+        let system = System::new(&dense, &areas, &rho, &s).expect("a valid system");
         for max_iterations in [0, 1, 3, 1000] {
             let config = Config {
                 tolerance: Tolerance::Error(1e-10),
                 max_iterations,
             };
             let solution = gauss_seidel(&system, &config, no_progress);
-            let ledger = Ledger::new(&system, &solution, &areas, &emission, &direct);
+            let ledger = Ledger::new(&system, &solution, &emission, &direct);
             // Sums of eight terms of either sign, a few units of rounding each.
             assert!(
                 ledger.imbalance().abs().max_element() < 1e-13,
@@ -142,15 +140,9 @@ mod tests {
     fn darkness_balances() {
         let dense = Dense::new(1, vec![0.0]).expect("a valid matrix");
         let s = [luxel_scenes::Radiosity::ZERO];
-        let system = System::new(&dense, &[Reflectance::ZERO], &s).expect("a valid system");
+        let system = System::new(&dense, &[1.0], &[Reflectance::ZERO], &s).expect("a valid system");
         let solution = super::super::direct(&system).expect("a regular matrix");
-        let ledger = Ledger::new(
-            &system,
-            &solution,
-            &[1.0],
-            &[Exitance::ZERO],
-            &[Irradiance::ZERO],
-        );
+        let ledger = Ledger::new(&system, &solution, &[Exitance::ZERO], &[Irradiance::ZERO]);
         assert_eq!(ledger.imbalance(), Rgb::ZERO, "no light");
     }
 }

@@ -6,16 +6,22 @@
 
 #[cfg(test)]
 mod conformance;
+mod conjugate_gradient;
 mod direct;
 mod gauss_seidel;
 mod jacobi;
 mod ledger;
+mod reciprocity;
 mod report;
+mod southwell;
 mod system;
 
+pub use conjugate_gradient::conjugate_gradient;
 pub use direct::{DirectError, direct};
 pub use gauss_seidel::gauss_seidel;
 pub use jacobi::jacobi;
 pub use ledger::Ledger;
+pub use reciprocity::NotReciprocal;
 pub use report::{Config, Outcome, Progress, Solution, Tolerance, no_progress};
+pub use southwell::{Ambient, southwell};
 pub use system::{System, SystemError, source};

@@ -7,12 +7,13 @@ use std::ops::ControlFlow;
 /// When an iteration may stop. Each of the three channels must satisfy it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
-    /// ‖r‖₁ ≤ t ‖r₀‖₁, relative to the residual r₀ = ρFS of the start B = S: the share of the first
+    /// Σ A|r| ≤ t Σ A|r₀|, relative to the residual r₀ = ρFS of the start B = S: the share of the first
     /// bounce that is not yet accounted for. Says how far the iteration has come, not how large
     /// the error is. It takes ln t / ln λ sweeps, λ the spectral radius of the iteration.
     Residual(f64),
-    /// ‖r‖∞ / (1 − ‖ρF‖∞) ≤ t max|B|: the rigorous bound on the largest error, relative to the
-    /// largest radiosity of the channel. What results should be asked for with.
+    /// ‖r‖∞ / (1 − ‖ρF‖∞) ≤ t max|B|, the rigorous bound on the largest error, relative to the
+    /// largest radiosity of the channel, and Σ A|r| ≤ t Σ A S, so that the energy ledger closes to t
+    /// where a small bright source lights large surfaces. What results should be asked for with.
     Error(f64),
 }
 
@@ -65,39 +66,43 @@ pub struct Solution {
     pub residual: Rgb,
     /// Bound on the largest error in W/m² per channel: ‖r‖∞ / (1 − ‖ρF‖∞).
     pub error_bound: Rgb,
-    /// ‖r‖∞ in W/m² per channel, first of the start B = S, then after each sweep. Jacobi's values
-    /// are exact; Gauss–Seidel's are upper bounds except near the end.
+    /// ‖r‖∞ in W/m² per channel, first of the start, then after each sweep. Jacobi's and Southwell's
+    /// values are exact; Gauss–Seidel's are upper bounds except near the end, and conjugate
+    /// gradient's come from its recurrence.
     pub residual_history: Vec<Rgb>,
 }
 
-/// The size of a residual in W/m² per channel.
+/// The size of a residual per channel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Residual {
-    /// ‖r‖∞, which the error bound is made of.
+    /// ‖r‖∞ in W/m², which the error bound is made of.
     pub(super) largest: Rgb,
-    /// ‖r‖₁/n.
-    pub(super) mean: Rgb,
+    /// Σ A|r| in W.
+    pub(super) flux: Rgb,
 }
 
 impl Residual {
-    /// The size of a residual from its elements.
-    pub(super) fn of(elements: impl Iterator<Item = Rgb>) -> Self {
-        let (mut largest, mut sum, mut count) = (Rgb::ZERO, Rgb::ZERO, 0_usize);
-        for r in elements {
-            largest = largest.max(r.abs());
-            sum += r.abs();
-            count += 1;
-        }
-        Self {
-            largest,
-            mean: sum / count.max(1) as f64,
-        }
+    /// The size of a residual from its elements, in the order of the areas.
+    pub(super) fn of(areas: &[f64], elements: impl Iterator<Item = Rgb>) -> Self {
+        let nothing = Self {
+            largest: Rgb::ZERO,
+            flux: Rgb::ZERO,
+        };
+        elements.zip(areas).fold(nothing, |size, (r, &area)| Self {
+            largest: size.largest.max(r.abs()),
+            flux: size.flux + r.abs() * area,
+        })
     }
 
     /// True when no channel is above `limit` times `factor`.
     pub(super) fn is_within(&self, limit: &Self, factor: f64) -> bool {
         self.largest.cmple(limit.largest * factor).all()
-            && self.mean.cmple(limit.mean * factor).all()
+            && self.flux.cmple(limit.flux * factor).all()
+    }
+
+    /// True when a channel is above `limit`.
+    pub(super) fn exceeds(&self, limit: &Self) -> bool {
+        !self.is_within(limit, 1.0)
     }
 }
 
@@ -113,7 +118,7 @@ impl Tolerance {
         match self {
             Self::Residual(t) => Residual {
                 largest: any,
-                mean: first.mean * t,
+                flux: first.flux * t,
             },
             Self::Error(t) => {
                 let brightest = radiosity
@@ -121,7 +126,7 @@ impl Tolerance {
                     .fold(Rgb::ZERO, |largest, b| largest.max(b.0.abs()));
                 Residual {
                     largest: brightest * (Rgb::ONE - system.gain()) * t,
-                    mean: any,
+                    flux: system.source_flux() * t,
                 }
             }
         }

@@ -6,7 +6,8 @@
 //! the bound is the standard one of a Neumann series. Valid for ‖ρF‖∞ < 1. It does not count the
 //! rounding of r itself, about n ε max|B|.
 
-use super::report::Residual;
+use super::reciprocity::{self, NotReciprocal};
+use super::report::{Residual, Solution};
 use crate::transport::Transport;
 use luxel_scenes::{Exitance, Irradiance, Radiosity, Reflectance, Rgb};
 use thiserror::Error;
@@ -16,16 +17,26 @@ use thiserror::Error;
 pub enum SystemError {
     /// The arrays do not have one element per unknown.
     #[error(
-        "the transport has {unknowns} unknowns, but there are {reflectances} reflectances and \
-         {sources} sources"
+        "the transport has {unknowns} unknowns, but there are {areas} areas, {reflectances} \
+         reflectances and {sources} sources"
     )]
     Length {
         /// Unknowns of the operator.
         unknowns: usize,
+        /// Areas given.
+        areas: usize,
         /// Reflectances given.
         reflectances: usize,
         /// Sources given.
         sources: usize,
+    },
+    /// An area that is not finite or is negative.
+    #[error("area {value} of unknown {unknown} is not finite and non-negative")]
+    Area {
+        /// The unknown.
+        unknown: usize,
+        /// Its area.
+        value: f64,
     },
     /// A reflectance outside [0, 1).
     #[error("reflectance {value} of unknown {unknown} lies outside [0, 1)")]
@@ -86,28 +97,39 @@ pub fn source(
 #[derive(Clone, Copy)]
 pub struct System<'a> {
     transport: &'a dyn Transport,
+    areas: &'a [f64],
     reflectance: &'a [Reflectance],
     source: &'a [Radiosity],
     gain: Rgb,
 }
 
 impl<'a> System<'a> {
-    /// A system from its operator, the reflectance ρ and the source radiosity S (W/m²) of each
-    /// unknown.
+    /// A system from its operator, and the area A (m²), reflectance ρ and source radiosity S (W/m²)
+    /// of each unknown. Areas weigh fluxes and means, and the solution does not depend on them; they
+    /// are zero for unknowns that stand for no surface.
     ///
     /// # Errors
     /// When lengths differ, a value is out of range, or ‖ρF‖∞ ≥ 1 in a channel.
     pub fn new(
         transport: &'a dyn Transport,
+        areas: &'a [f64],
         reflectance: &'a [Reflectance],
         source: &'a [Radiosity],
     ) -> Result<Self, SystemError> {
         let unknowns = transport.len();
-        if reflectance.len() != unknowns || source.len() != unknowns {
+        let lengths = [areas.len(), reflectance.len(), source.len()];
+        if lengths != [unknowns; 3] {
             return Err(SystemError::Length {
                 unknowns,
+                areas: areas.len(),
                 reflectances: reflectance.len(),
                 sources: source.len(),
+            });
+        }
+        if let Some(unknown) = areas.iter().position(|a| !(a.is_finite() && *a >= 0.0)) {
+            return Err(SystemError::Area {
+                unknown,
+                value: areas[unknown],
             });
         }
         let mut gain = Rgb::ZERO;
@@ -136,6 +158,7 @@ impl<'a> System<'a> {
         }
         Ok(Self {
             transport,
+            areas,
             reflectance,
             source,
             gain,
@@ -157,6 +180,11 @@ impl<'a> System<'a> {
         self.transport
     }
 
+    /// A of each unknown in m².
+    pub fn areas(&self) -> &'a [f64] {
+        self.areas
+    }
+
     /// ρ of each unknown.
     pub fn reflectance(&self) -> &'a [Reflectance] {
         self.reflectance
@@ -165,6 +193,12 @@ impl<'a> System<'a> {
     /// S of each unknown in W/m².
     pub fn source(&self) -> &'a [Radiosity] {
         self.source
+    }
+
+    /// Σ A S in W per channel.
+    pub(super) fn source_flux(&self) -> Rgb {
+        let pairs = self.source.iter().zip(self.areas);
+        pairs.map(|(s, &area)| s.0 * area).sum()
     }
 
     /// ‖ρF‖∞ per channel, below 1.
@@ -177,9 +211,20 @@ impl<'a> System<'a> {
         residual / (Rgb::ONE - self.gain)
     }
 
+    /// A bound on the root mean square of a solution's error, weighted by area, in W/m² per channel:
+    /// √(Σ A e² / Σ A). At most [`Solution::error_bound`], and far below it where few unknowns have a
+    /// large residual or bright surfaces face dark ones. See the module `reciprocity` for its
+    /// derivation. Costs ten gathers.
+    ///
+    /// # Errors
+    /// When the operator is not reciprocal, as the bound asks.
+    pub fn mean_error_bound(&self, solution: &Solution) -> Result<Rgb, NotReciprocal> {
+        reciprocity::mean_error_bound(self, &solution.radiosity, &solution.irradiance)
+    }
+
     /// The size of S + ρE − B, where E = F B.
     pub(super) fn residual(&self, radiosity: &[Radiosity], irradiance: &[Irradiance]) -> Residual {
-        Residual::of(self.residuals(radiosity, irradiance))
+        Residual::of(self.areas, self.residuals(radiosity, irradiance))
     }
 
     /// r_i = S_i + ρ_i E_i − B_i in W/m² of each unknown, where E = F B.

@@ -5,7 +5,6 @@
 
 use super::Transport;
 use luxel_scenes::{Irradiance, Radiosity, Rgb};
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -110,16 +109,20 @@ impl Transport for Dense {
         Irradiance(dot(self.row(row), radiosity))
     }
 
+    fn visit_row(&self, row: usize, visit: &mut dyn FnMut(usize, f64)) {
+        for (column, &factor) in self.row(row).iter().enumerate() {
+            if factor > 0.0 {
+                visit(column, factor);
+            }
+        }
+    }
+
     fn coupling(&self, row: usize) -> f64 {
         self.get(row, row)
     }
 
     fn row_sum(&self, row: usize) -> f64 {
         self.row_sums[row]
-    }
-
-    fn to_dense(&self) -> DMatrix<f64> {
-        DMatrix::from_row_slice(self.len, self.len, &self.entries)
     }
 }
 

@@ -7,7 +7,6 @@
 
 use super::Transport;
 use luxel_scenes::{Irradiance, Radiosity, Rgb};
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -95,6 +94,14 @@ impl Transport for SparseRows {
         Irradiance(sum / f64::from(row.rays))
     }
 
+    fn visit_row(&self, row: usize, visit: &mut dyn FnMut(usize, f64)) {
+        let row = self.rows[row];
+        let share = 1.0 / f64::from(row.rays.max(1));
+        for &entry in &self.entries[row.entries()] {
+            visit(entry as usize, share);
+        }
+    }
+
     fn coupling(&self, row: usize) -> f64 {
         let range = self.rows[row];
         let own = self.entries[range.entries()]
@@ -106,17 +113,6 @@ impl Transport for SparseRows {
     fn row_sum(&self, row: usize) -> f64 {
         let row = self.rows[row];
         row.entries().len() as f64 / f64::from(row.rays.max(1))
-    }
-
-    fn to_dense(&self) -> DMatrix<f64> {
-        let n = self.len();
-        let mut matrix = DMatrix::zeros(n, n);
-        for (index, row) in self.rows.iter().enumerate() {
-            for &entry in &self.entries[row.entries()] {
-                matrix[(index, entry as usize)] += 1.0 / f64::from(row.rays);
-            }
-        }
-        matrix
     }
 }
 
