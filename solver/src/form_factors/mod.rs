@@ -7,7 +7,7 @@
 //! |---|---|---|
 //! | analytic, nothing between ([`exchange_area`]) | the accuracy asked for, to 1e-12 or so | 0.3–10 µs a pair |
 //! | analytic, past occluders ([`occluded_exchange_area`]) | standard error, 1e-4 or less with 1000 points | 1 µs a point and occluder |
-//! | ray-cast ([`ray_cast`]) | standard error, N^-0.5 to N^-0.75 | N rays a row, whatever the scene |
+//! | ray-cast ([`ray_cast`], as an operator [`ray_cast_rows`]) | standard error, N^-0.5 to N^-0.75 | N rays a row, whatever the scene |
 //! | hemicube ([`hemicube()`]) | biased, order 1 and better in the resolution | see [`hemicube`](mod@hemicube) |
 //!
 //! From an element to a polygon, [`point_to_polygon`] is exact; it is the kernel of direct light, too.
@@ -26,6 +26,7 @@ mod point_to_polygon;
 mod polygon;
 mod polygon_to_polygon;
 mod ray_cast;
+mod ray_cast_rows;
 mod repair;
 mod report;
 mod scene;
@@ -42,6 +43,7 @@ pub use point_to_polygon::point_to_polygon;
 pub use polygon::{Polygon, PolygonError};
 pub use polygon_to_polygon::{exchange_area, polygon_to_polygon};
 pub use ray_cast::{REPLICATES, RayCastConfig, RayCastFactors, ray_cast, ray_cast_row};
+pub use ray_cast_rows::{RayCastRowsConfig, ray_cast_rows};
 pub use repair::{Repair, RepairError, Target, repair};
 pub use report::{Closure, closure, reciprocity_defect, reciprocity_defect_of_largest};
 pub use scene::{analytic_factors, hemicube_factors};

@@ -109,6 +109,22 @@ fn count_hits(
     rays: u32,
 ) -> Vec<u32> {
     let mut counts = vec![0; patches.len()];
+    cast(world, patches, patch, sequence, rays, |met| {
+        counts[met.index()] += 1;
+    });
+    counts
+}
+
+/// Calls `visit` with the patch that each of the first `rays` rays of a sequence from a patch meets, in
+/// the order of the sequence; rays that meet none are left out.
+pub(super) fn cast(
+    world: &World,
+    patches: &Patches,
+    patch: PatchId,
+    sequence: Sequence,
+    rays: u32,
+    mut visit: impl FnMut(PatchId),
+) {
     let mut batch = Vec::with_capacity(BATCH as usize);
     let mut hits = Vec::new();
     for first in (0..rays).step_by(BATCH as usize) {
@@ -124,9 +140,8 @@ fn count_hits(
         world.bvh().closest_hits(&batch, &mut hits);
         for (ray, hit) in batch.iter().zip(&hits) {
             if let Some(met) = world.patch_hit(patches, ray, hit) {
-                counts[met.index()] += 1;
+                visit(met);
             }
         }
     }
-    counts
 }

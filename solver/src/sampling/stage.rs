@@ -40,4 +40,6 @@ impl Stage {
     pub const SKY: Self = Self(16);
     /// Signs that test operators for reciprocity.
     pub const RECIPROCITY: Self = Self(17);
+    /// Points on surfaces at which methods are compared.
+    pub const COMPARISON: Self = Self(20);
 }
