@@ -5,6 +5,8 @@
 //! byte, and appends `e_r,e_g,e_b,se_r,se_g,se_b`; columns of these names in the input are
 //! replaced, so that a result can be probed again.
 
+mod results;
+
 use csv::StringRecord;
 use glam::DVec3;
 use luxel_scenes::Rgb;
@@ -53,7 +55,19 @@ pub enum PointsError {
         /// The missing column.
         column: &'static str,
     },
-    /// A field holds no finite number.
+    /// A column of results is missing.
+    #[error(
+        "{}, line 1: no column {column:?}; a reference has e_r,e_g,e_b, and se_r,se_g,se_b where its error is \
+         known, as probe writes them",
+        .path.display()
+    )]
+    NoResult {
+        /// The file.
+        path: PathBuf,
+        /// The missing column.
+        column: &'static str,
+    },
+    /// A field holds no finite number, or a standard error that is negative.
     #[error("{}, line {line}: {column} is {text:?}, not a finite number", .path.display())]
     NotANumber {
         /// The file.
@@ -179,19 +193,8 @@ fn parse_point(
 ) -> Result<Point, PointsError> {
     let line = record.position().map_or(0, csv::Position::line);
     let mut numbers = [0.0; 6];
-    for ((number, index), column) in numbers.iter_mut().zip(columns).zip(INPUT) {
-        let text = &record[index];
-        *number = match text.trim().parse::<f64>() {
-            Ok(value) if value.is_finite() => value,
-            _ => {
-                return Err(PointsError::NotANumber {
-                    path: path.to_path_buf(),
-                    line,
-                    column,
-                    text: text.to_owned(),
-                });
-            }
-        };
+    for ((field, index), column) in numbers.iter_mut().zip(columns).zip(INPUT) {
+        *field = number(record, index, column, path)?;
     }
     let normal = DVec3::new(numbers[3], numbers[4], numbers[5]);
     // Scaled first, so that tiny and huge normals neither vanish nor overflow when squared.
@@ -206,6 +209,25 @@ fn parse_point(
         position: DVec3::new(numbers[0], numbers[1], numbers[2]),
         normal: (normal / largest).normalize(),
     })
+}
+
+/// The finite number in a field.
+fn number(
+    record: &StringRecord,
+    index: usize,
+    column: &'static str,
+    path: &Path,
+) -> Result<f64, PointsError> {
+    let text = &record[index];
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(PointsError::NotANumber {
+            path: path.to_path_buf(),
+            line: record.position().map_or(0, csv::Position::line),
+            column,
+            text: text.to_owned(),
+        }),
+    }
 }
 
 #[cfg(test)]

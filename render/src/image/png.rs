@@ -19,11 +19,23 @@ pub fn encode(image: &Image, tone_map: ToneMap) -> Result<Vec<u8>, EncodePngErro
         .iter()
         .flat_map(|&pixel| tone_map.apply(pixel))
         .collect();
+    encode_rgb8(&samples, [image.width, image.height])
+}
+
+/// The bytes of a PNG file of `size` (width, height) pixels whose sRGB samples are given, row by row from
+/// the top.
+///
+/// # Errors
+/// When there are no pixels or more than PNG can hold.
+///
+/// # Panics
+/// When there are not three samples per pixel.
+pub fn encode_rgb8(samples: &[u8], size: [usize; 2]) -> Result<Vec<u8>, EncodePngError> {
     let mut bytes = Vec::new();
     PngEncoder::new(&mut bytes).write_image(
-        &samples,
-        image.width as u32,
-        image.height as u32,
+        samples,
+        size[0] as u32,
+        size[1] as u32,
         ExtendedColorType::Rgb8,
     )?;
     Ok(bytes)
