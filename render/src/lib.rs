@@ -23,6 +23,7 @@ pub mod matrix;
 pub mod ply;
 pub mod points;
 pub mod progress;
+pub mod report;
 pub mod solution;
 pub mod tone_map;
 pub mod view;

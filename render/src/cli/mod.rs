@@ -5,6 +5,7 @@
 
 mod check;
 mod common;
+mod converge;
 mod dense;
 mod diff;
 mod exit;
@@ -42,6 +43,7 @@ enum Verb {
     Solve(solve::Solve),
     Probe(probe::Probe),
     FormFactors(form_factors::FormFactors),
+    Converge(converge::Converge),
     Check(check::Check),
     Diff(diff::Diff),
 }
@@ -106,6 +108,7 @@ pub fn run_with(
         Verb::Solve(verb) => verb.run(&mut session),
         Verb::Probe(verb) => verb.run(&mut session),
         Verb::FormFactors(verb) => verb.run(&mut session),
+        Verb::Converge(verb) => verb.run(&mut session),
         Verb::Check(verb) => verb.run(&mut session),
         Verb::Diff(verb) => verb.run(&mut session),
     };

@@ -5,6 +5,7 @@ use crate::image::exr::read;
 use std::fs;
 use std::path::PathBuf;
 
+mod converge;
 mod results;
 mod views;
 
@@ -81,7 +82,15 @@ fn help_and_version_are_results() {
     let (exit, stdout, stderr) = luxel(&["--version"]);
     assert_eq!((exit, stderr.as_str()), (ExitCode::Ok, ""));
     assert!(stdout.starts_with("luxel "));
-    for verb in ["render", "solve", "probe", "form-factors", "check", "diff"] {
+    for verb in [
+        "render",
+        "solve",
+        "probe",
+        "form-factors",
+        "converge",
+        "check",
+        "diff",
+    ] {
         let (exit, stdout, _) = luxel(&[verb, "--help"]);
         assert_eq!(exit, ExitCode::Ok);
         assert!(stdout.contains("--seed"), "{verb}");
