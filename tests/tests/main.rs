@@ -10,6 +10,7 @@ mod form_factors;
 mod golden;
 mod hemicube;
 mod irradiance_fields;
+mod leaks;
 mod ray_cast;
 mod references;
 mod sampling;

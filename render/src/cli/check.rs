@@ -13,8 +13,10 @@ use std::path::PathBuf;
 /// Name everything suspicious about a scene
 ///
 /// What the reader put right, what is odd about geometry, materials, lights and units, and what rays
-/// find (backs of faces in the light, cameras and lights inside solids), one line each, named by
-/// object and face. A warning is hardly ever meant; a note often is.
+/// find (backs of faces in the light, cameras and lights inside solids, gaps that light leaks
+/// through, openings), one line each, named by object and face. A warning is hardly ever meant; a
+/// note often is. With --json, what rays find has a kind, objects, a position in metres and a
+/// fraction besides its message.
 #[derive(clap::Args)]
 pub(super) struct Check {
     /// Scene file (.toml), or geometry (.obj, .gltf, .glb)
@@ -30,23 +32,21 @@ impl Check {
         let loaded = load(&self.scene)?;
         let corrected = loaded.warnings.iter().map(ToString::to_string);
         let suspicious = report(&loaded.scene);
-        let mut findings: Vec<(Severity, String)> = corrected
-            .map(|text| (Severity::Warning, text))
-            .chain(suspicious.iter().map(|f| (f.severity(), f.to_string())))
+        let mut findings: Vec<Line> = corrected
+            .map(|text| Line::new(Severity::Warning, text))
+            .chain(
+                suspicious
+                    .iter()
+                    .map(|f| Line::new(f.severity(), f.to_string())),
+            )
             .chain(session.context.common.install(|| seen(&loaded.scene))?)
             .collect();
-        findings.sort_by_key(|(severity, _)| std::cmp::Reverse(*severity));
-        let count = |severity| findings.iter().filter(|(s, _)| *s == severity).count();
+        findings.sort_by_key(|line| std::cmp::Reverse(line.severity));
+        let count = |severity| findings.iter().filter(|f| f.severity == severity).count();
         let (warnings, notes) = (count(Severity::Warning), count(Severity::Note));
 
         let scene = &loaded.scene;
         let text = if session.context.common.json {
-            let finding = |(severity, message): &(Severity, String)| {
-                serde_json::json!({
-                    "severity": name(*severity),
-                    "message": message,
-                })
-            };
             serde_json::to_string_pretty(&serde_json::json!({
                 "scene": scene.name,
                 "faces": scene.faces.len(),
@@ -54,14 +54,13 @@ impl Check {
                 "lights": scene.lights.len(),
                 "warnings": warnings,
                 "notes": notes,
-                "findings": findings.iter().map(finding).collect::<Vec<_>>(),
+                "findings": findings.iter().map(Line::to_json).collect::<Vec<_>>(),
             }))?
         } else if findings.is_empty() {
             "nothing suspicious".to_owned()
         } else {
-            let line =
-                |(severity, text): &(Severity, String)| format!("{}: {text}", name(*severity));
-            findings.iter().map(line).collect::<Vec<_>>().join("\n")
+            let lines: Vec<String> = findings.iter().map(Line::to_string).collect();
+            lines.join("\n")
         };
         session.print(&text)?;
         session.context.reporter.note(format_args!(
@@ -76,19 +75,61 @@ impl Check {
     }
 }
 
+/// A finding as it is printed.
+struct Line {
+    severity: Severity,
+    message: String,
+    /// What rays found, for programs.
+    found: Option<audit::Finding>,
+}
+
+impl Line {
+    fn new(severity: Severity, message: String) -> Self {
+        Self {
+            severity,
+            message,
+            found: None,
+        }
+    }
+
+    fn to_json(&self) -> serde_json::Value {
+        let mut value = serde_json::json!({
+            "severity": name(self.severity),
+            "message": self.message,
+        });
+        if let Some(found) = &self.found {
+            value["kind"] = found.kind().into();
+            value["objects"] = found.objects().into();
+            value["position"] = serde_json::json!(found.position().map(|p| p.to_array()));
+            value["fraction"] = serde_json::json!(found.fraction());
+        }
+        value
+    }
+}
+
+impl std::fmt::Display for Line {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", name(self.severity), self.message)
+    }
+}
+
 /// What rays find, and cameras that make no rays.
-fn seen(scene: &Scene) -> Vec<(Severity, String)> {
+fn seen(scene: &Scene) -> Vec<Line> {
     let world = World::new(scene);
     let mut findings = Vec::new();
     let mut views = Vec::new();
     for camera in &scene.cameras {
         match CameraFrame::new(camera, camera.size) {
             Ok(frame) => views.push(view(&world, &camera.name, &frame)),
-            Err(error) => findings.push((Severity::Warning, error.to_string())),
+            Err(error) => findings.push(Line::new(Severity::Warning, error.to_string())),
         }
     }
-    let by_rays = audit::report(&world, &views);
-    findings.extend(by_rays.iter().map(|f| (f.severity(), f.to_string())));
+    let by_rays = audit::report(&world, &views).into_iter();
+    findings.extend(by_rays.map(|found| Line {
+        severity: found.severity(),
+        message: found.to_string(),
+        found: Some(found),
+    }));
     findings
 }
 

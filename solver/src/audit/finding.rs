@@ -33,6 +33,19 @@ impl fmt::Display for Place {
     }
 }
 
+/// What lies beyond a gap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LeadsTo {
+    /// Nothing, or the backs of other surfaces.
+    Outside,
+    /// A room that does not see the first.
+    AnotherRoom,
+}
+
+/// Share of the light from which a leak is a fault: a hundredth of a per mille shows in no result, and
+/// coordinates of six digits make such gaps.
+const LEAK: f64 = 1e-5;
+
 /// Something suspicious that rays found.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Finding {
@@ -70,6 +83,30 @@ pub enum Finding {
         /// The face.
         face: FaceRef,
     },
+    /// A narrow gap through which light leaves a room.
+    Gap {
+        /// A face with a free edge, and the one that it should touch.
+        between: [FaceRef; 2],
+        /// The middle of the gap where it is widest, in metres.
+        at: DVec3,
+        /// Its largest width in metres.
+        width: f64,
+        /// Its length in metres.
+        length: f64,
+        /// Its area over that of all lit surfaces: about the share of the light that leaves.
+        share: f64,
+        /// What is beyond it.
+        leads_to: LeadsTo,
+    },
+    /// A wide opening to the outside.
+    Opening {
+        /// Share of the rays from lit surfaces that leave the scene.
+        fraction: f64,
+        /// The objects that its rim belongs to.
+        rim: Vec<String>,
+        /// The middle of the rim in metres.
+        at: DVec3,
+    },
     /// A point or spot light most of whose rays meet backs.
     LightInside {
         /// The light.
@@ -87,8 +124,61 @@ impl Finding {
         match self {
             Self::BackSeen {
                 is_frequent: false, ..
-            } => Severity::Note,
+            }
+            | Self::Opening { .. } => Severity::Note,
+            Self::Gap { share, .. } if *share < LEAK => Severity::Note,
             _ => Severity::Warning,
+        }
+    }
+
+    /// A word for the kind of finding, for programs.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::BackSeen { .. } => "back-seen",
+            Self::ObjectInside { .. } => "object-inside",
+            Self::CameraInside { .. } => "camera-inside",
+            Self::CameraOnFace { .. } => "camera-on-face",
+            Self::Gap { .. } => "gap",
+            Self::Opening { .. } => "opening",
+            Self::LightInside { .. } => "light-inside",
+        }
+    }
+
+    /// The objects that it is about, each once.
+    pub fn objects(&self) -> Vec<&str> {
+        let mut objects: Vec<&str> = match self {
+            Self::BackSeen { place, .. }
+            | Self::CameraInside { place, .. }
+            | Self::LightInside { place, .. } => vec![&place.face.object],
+            Self::ObjectInside { object, around } => vec![object, &around.object],
+            Self::CameraOnFace { face, .. } => vec![&face.object],
+            Self::Gap { between, .. } => between.iter().map(|f| f.object.as_str()).collect(),
+            Self::Opening { rim, .. } => rim.iter().map(String::as_str).collect(),
+        };
+        objects.dedup();
+        objects
+    }
+
+    /// Where it is, in metres.
+    pub fn position(&self) -> Option<DVec3> {
+        match self {
+            Self::BackSeen { place, .. }
+            | Self::CameraInside { place, .. }
+            | Self::LightInside { place, .. } => Some(place.at),
+            Self::Gap { at, .. } | Self::Opening { at, .. } => Some(*at),
+            Self::ObjectInside { .. } | Self::CameraOnFace { .. } => None,
+        }
+    }
+
+    /// How much it is, as a fraction of the light or of the rays in question.
+    pub fn fraction(&self) -> Option<f64> {
+        match self {
+            Self::BackSeen { fraction, .. }
+            | Self::CameraInside { fraction, .. }
+            | Self::LightInside { fraction, .. }
+            | Self::Opening { fraction, .. } => Some(*fraction),
+            Self::Gap { share, .. } => Some(*share),
+            Self::ObjectInside { .. } | Self::CameraOnFace { .. } => None,
         }
     }
 
@@ -159,6 +249,38 @@ impl fmt::Display for Finding {
                 "camera `{camera}` lies on {face}: which side it sees is left to rounding; move it \
                  off the face"
             ),
+            Self::Gap {
+                between: [first, second],
+                at,
+                width,
+                length,
+                share,
+                leads_to,
+            } => {
+                let DVec3 { x, y, z } = at;
+                let to = match leads_to {
+                    LeadsTo::Outside => "to the outside",
+                    LeadsTo::AnotherRoom => "to another room",
+                };
+                write!(
+                    f,
+                    "light leaks {to} between {first} and {second}: a gap of {length:.4} m up to \
+                     {width:.2e} m wide, at ({x:.4}, {y:.4}, {z:.4}), for about {share:.1e} of the light; \
+                     move or extend one of them until they meet or overlap"
+                )
+            }
+            Self::Opening { fraction, rim, at } => {
+                let DVec3 { x, y, z } = at;
+                let names: Vec<String> = rim.iter().take(4).map(|r| format!("`{r}`")).collect();
+                let more = if rim.len() > 4 { ", …" } else { "" };
+                write!(
+                    f,
+                    "opening around ({x:.4}, {y:.4}, {z:.4}), bounded by {}{more}: {:.2} % of the rays \
+                     from surfaces leave the scene; close it if it is not meant",
+                    names.join(", "),
+                    percent(*fraction)
+                )
+            }
             Self::LightInside {
                 light,
                 fraction,

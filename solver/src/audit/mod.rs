@@ -1,5 +1,5 @@
 //! What is suspicious about a scene that only rays can find: backs of faces in the light, objects
-//! inside solids, eyes inside walls, lights inside housings.
+//! inside solids, eyes inside walls, lights inside housings, gaps that light leaves a room by.
 //!
 //! Rays leave points spread over the lit sides of all faces, the eyes of cameras and the point
 //! lights. Where most rays from a point meet the backs of one-sided faces, the point lies inside a
@@ -10,13 +10,14 @@
 //! 300 000 rays and 64 for each light, 0.1–0.5 s.
 
 mod finding;
+mod leaks;
 mod tally;
 
-pub use finding::{Finding, Place};
+pub use finding::{Finding, LeadsTo, Place};
 
 use crate::bvh::Ray;
 use crate::geometry::offset_bound;
-use crate::patches::{PatchId, PatchSize, Patches};
+use crate::patches::{PatchId, PatchSize, Patches, Side};
 use crate::sampling::{Frame, Sequence, Stage, cosine_hemisphere, sphere};
 use crate::world::World;
 use glam::{DVec3, Vec3};
@@ -66,6 +67,7 @@ pub fn report(world: &World, views: &[View]) -> Vec<Finding> {
     let surfaces = from_surfaces(world);
     let mut findings = surfaces.backs(world, None);
     findings.extend(surfaces.buried(world));
+    findings.extend(leaks::report(world, lit_area(world), surfaces.escaping()));
     for view in views {
         if let Some(finding) = inside_view(world, view) {
             findings.push(finding);
@@ -187,6 +189,17 @@ fn in_cone(axis: Vec3, angle: f32, [x, y]: [f32; 2]) -> Vec3 {
     let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
     let (sin, cos) = (std::f32::consts::TAU * y).sin_cos();
     Frame::around(axis).to_world(Vec3::new(sine * cos, sine * sin, cosine))
+}
+
+/// Area of the lit sides of all faces, in square units.
+fn lit_area(world: &World) -> f64 {
+    let surfaces = world.surfaces();
+    let sides = |face| [Side::Front, Side::Back].map(|side| surfaces.has_side(face, side));
+    let lit = |face| sides(face).into_iter().filter(|lit| *lit).count();
+    let faces = world.scene().face_ids();
+    faces
+        .map(|face| surfaces.area(face) * lit(face) as f64)
+        .sum()
 }
 
 /// What points all over the lit sides of faces see.

@@ -62,6 +62,8 @@ pub(super) struct Tally {
     points: Vec<[u32; 2]>,
     /// Of each object: the back that was met first from inside a solid.
     around: Vec<Option<FaceId>>,
+    /// Rays of points that see more lit surfaces than nothing, and those of them that left the scene.
+    rays: [u64; 2],
 }
 
 impl Tally {
@@ -72,6 +74,7 @@ impl Tally {
             faces: vec![[0; 2]; scene.faces.len()],
             points: vec![[0; 2]; scene.objects.len()],
             around: vec![None; scene.objects.len()],
+            rays: [0; 2],
         }
     }
 
@@ -100,6 +103,12 @@ impl Tally {
             let around = &mut self.around[object.index()];
             *around = around.or(met.iter().find_map(back));
         } else {
+            let missed = met.iter().filter(|met| **met == Met::Nothing).count();
+            // Others stand outside: they are not in a room that light could leave.
+            if met.len() - backs >= 2 * missed {
+                self.rays[0] += met.len() as u64;
+                self.rays[1] += missed as u64;
+            }
             self.add(met);
         }
     }
@@ -116,9 +125,18 @@ impl Tally {
         for (sum, more) in self.points.iter_mut().zip(&later.points) {
             add(sum, more);
         }
+        for (sum, more) in self.rays.iter_mut().zip(later.rays) {
+            *sum += more;
+        }
         for (first, next) in self.around.iter_mut().zip(&later.around) {
             *first = first.or(*next);
         }
+    }
+
+    /// Fraction of the rays from points in rooms that left the scene.
+    pub(super) fn escaping(&self) -> f64 {
+        let [rays, escaped] = self.rays;
+        escaped as f64 / rays.max(1) as f64
     }
 
     /// All hits of backs.
