@@ -8,6 +8,16 @@
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Held while a file is written under its temporary name.
+static WRITING: Mutex<()> = Mutex::new(());
+
+/// Waits until no file is being written, and lets none be written while the guard lives: so that the
+/// process can end without leaving a temporary file behind.
+pub fn hold_writes() -> MutexGuard<'static, ()> {
+    WRITING.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Why an output file cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -55,6 +65,7 @@ impl Output {
             target,
         };
         if !output.special {
+            let _held = hold_writes();
             output.temporary()?;
         }
         Ok(output)
@@ -78,6 +89,7 @@ impl Output {
                 .and_then(|mut file| file.write_all(bytes))
                 .map_err(refused);
         }
+        let _held = hold_writes();
         let mut temporary = self.temporary()?;
         temporary.write_all(bytes).map_err(refused)?;
         temporary

@@ -1,19 +1,29 @@
-//! The film: mean and variance of every pixel.
+//! The film: what every pixel sees, and how wrong it is.
 //!
-//! For n values x of a pixel, Welford's recurrences keep mean μ and m₂ = Σ (x − μ)², so that the
-//! sample variance is s² = m₂/(n − 1) and the standard error of the mean s/√n. Source: B. P.
-//! Welford, "Note on a method for calculating corrected sums of squares and products",
-//! Technometrics 4(3), 1962. The standard error is honest only when the values are *independent*:
-//! what is added is therefore the mean of one whole replicate (a low-discrepancy set with a
-//! scramble of its own), never a single point of a set. Cost: 56 bytes a pixel.
+//! A pixel holds the means of a few independent replicates, each a low-discrepancy set with a
+//! scramble of its own (and, where light is looked up in a mesh, with a solution of its own): the
+//! scatter s² = Σ (x_r − x̄)² / (R (R − 1)) is the variance of their mean, which the samples of a set
+//! among themselves would not tell. It is moderated by the neighbours' ([`moderate`]). Films take
+//! further samples, of the same sequences, until the error suits. Cost: 144 bytes a pixel.
+//!
+//! [`Moments`] are Welford's recurrences for a single receiver: mean μ and m₂ = Σ (x − μ)². Source:
+//! B. P. Welford, "Note on a method for calculating corrected sums of squares and products",
+//! Technometrics 4(3), 1962.
 
 use crate::image::Image;
+use crate::integrators::Seen;
+use glam::Vec3;
 use luxel_scenes::Rgb;
+use luxel_solver::error::{discretisation, moderate};
+use luxel_solver::gather::MAX_REPLICATES;
 use rayon::prelude::*;
 
 /// Pixels that one task computes together: enough rays for a batch, few enough that a small
 /// picture still feeds every thread.
-pub const PIXELS_PER_TASK: usize = 512;
+const PIXELS_PER_TASK: usize = 512;
+
+/// Receivers of a film of one row that one task computes together: they get many samples each.
+const RECEIVERS_PER_TASK: usize = 16;
 
 /// Running mean and variance of independent values, per channel.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -59,19 +69,97 @@ impl Moments {
     }
 }
 
-/// Pixels in row-major order, row 0 at the top.
+/// The replicates of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Pixel {
+    /// Mean of the samples of each replicate.
+    means: [Rgb; MAX_REPLICATES],
+    /// Mean differences from a coarser mesh. Single precision: they are estimates of an error.
+    differences: [Vec3; MAX_REPLICATES],
+}
+
+/// Sums over new samples of a pixel, by replicate.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Exposure {
+    sums: [Seen; MAX_REPLICATES],
+}
+
+impl Exposure {
+    /// Takes in one more sample of a replicate.
+    ///
+    /// # Panics
+    /// When `replicate` is not below [`MAX_REPLICATES`].
+    pub fn add(&mut self, replicate: u32, seen: Seen) {
+        self.sums[replicate as usize] += seen;
+    }
+}
+
+/// Pixels in row-major order, row 0 at the top: or any other receivers, in one row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     size: [usize; 2],
-    pixels: Vec<Moments>,
+    replicates: u32,
+    /// Samples of each replicate of every pixel.
+    samples: u32,
+    pixels: Vec<Pixel>,
+}
+
+/// Relative error of a film, rms over mean.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct FilmError {
+    /// Noise.
+    pub sampling: f64,
+    /// What the size of patches leaves.
+    pub discretisation: f64,
+}
+
+impl FilmError {
+    /// Both together.
+    pub fn total(self) -> f64 {
+        self.sampling.hypot(self.discretisation)
+    }
+}
+
+/// How the noise of a pixel can be guessed from other pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Alike {
+    /// Neighbours are about equally noisy.
+    Neighbours,
+    /// All are about equally noisy relative to their values.
+    Values,
+}
+
+/// The error of a pixel, one standard deviation each, in the unit of the values.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct PixelError {
+    /// Noise.
+    pub sampling: Rgb,
+    /// What the size of patches leaves.
+    pub discretisation: Rgb,
+}
+
+impl PixelError {
+    /// Both together.
+    pub fn total(&self) -> Rgb {
+        (self.sampling * self.sampling + self.discretisation * self.discretisation).map(f64::sqrt)
+    }
 }
 
 impl Film {
     /// An empty film of `size` (width, height) pixels.
-    pub fn new(size: [usize; 2]) -> Self {
+    ///
+    /// # Panics
+    /// When there is not at least one replicate or more than [`MAX_REPLICATES`].
+    pub fn new(size: [usize; 2], replicates: u32) -> Self {
+        assert!(
+            (1..=MAX_REPLICATES as u32).contains(&replicates),
+            "one to {MAX_REPLICATES} replicates"
+        );
         Self {
             size,
-            pixels: vec![Moments::default(); size[0] * size[1]],
+            replicates,
+            samples: 0,
+            pixels: vec![Pixel::default(); size[0] * size[1]],
         }
     }
 
@@ -80,52 +168,193 @@ impl Film {
         self.size
     }
 
-    /// The moments of all pixels, row-major, row 0 at the top.
-    pub fn pixels(&self) -> &[Moments] {
-        &self.pixels
+    /// Independent replicates of each pixel.
+    pub fn replicates(&self) -> u32 {
+        self.replicates
     }
 
-    /// Lets `expose` add values to all pixels, in parallel, [`PIXELS_PER_TASK`] consecutive pixels
-    /// a call: it gets the index of the first one and their moments. Every pixel belongs to one
-    /// call, so that the result does not depend on the number of threads when `expose` is a
-    /// function of its arguments.
-    pub fn expose(&mut self, expose: impl Fn(usize, &mut [Moments]) + Sync) {
+    /// Samples of each replicate of every pixel so far.
+    pub fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    /// Lets `expose` add `samples` samples to every replicate of all pixels, in parallel,
+    /// some consecutive pixels a call: it gets the index of the first one and their
+    /// exposures. Every pixel belongs to one call, so that the result does not depend on the number
+    /// of threads when `expose` is a function of its arguments.
+    pub fn expose(&mut self, samples: u32, expose: impl Fn(usize, &mut [Exposure]) + Sync) {
+        let total = f64::from(self.samples + samples);
+        let (old, new) = (f64::from(self.samples) / total, 1.0 / total);
+        let task_size = if self.size[1] == 1 {
+            RECEIVERS_PER_TASK
+        } else {
+            PIXELS_PER_TASK
+        };
         self.pixels
-            .par_chunks_mut(PIXELS_PER_TASK)
+            .par_chunks_mut(task_size)
             .enumerate()
-            .for_each(|(task, pixels)| expose(task * PIXELS_PER_TASK, pixels));
+            .for_each(|(task, pixels)| {
+                let mut exposures = vec![Exposure::default(); pixels.len()];
+                expose(task * task_size, &mut exposures);
+                for (pixel, exposure) in pixels.iter_mut().zip(&exposures) {
+                    for (r, seen) in exposure.sums.iter().enumerate() {
+                        pixel.means[r] = pixel.means[r] * old + seen.value * new;
+                        let difference = seen.mesh_difference * new;
+                        pixel.differences[r] =
+                            pixel.differences[r] * old as f32 + difference.as_vec3();
+                    }
+                }
+            });
+        self.samples += samples;
     }
 
-    /// The means, as an image in the unit of the values.
-    pub fn mean(&self) -> Image {
-        self.image(Moments::mean)
-    }
-
-    /// The standard errors of the means, as an image; `None` when a pixel holds fewer than two
-    /// values.
-    pub fn standard_error(&self) -> Option<Image> {
+    /// The value of each pixel.
+    pub fn values(&self) -> impl Iterator<Item = Rgb> {
+        let share = 1.0 / f64::from(self.replicates);
         self.pixels
             .iter()
-            .all(|pixel| pixel.count > 1)
-            .then(|| self.image(|pixel| pixel.standard_error().unwrap_or_default()))
+            .map(move |pixel| self.used(&pixel.means).sum::<Rgb>() * share)
     }
 
-    fn image(&self, value: impl Fn(&Moments) -> Rgb) -> Image {
-        let pixels = self
-            .pixels
-            .iter()
-            .map(|pixel| value(pixel).as_vec3().to_array());
-        Image {
-            width: self.size[0],
-            height: self.size[1],
-            pixels: pixels.collect(),
+    /// The values, as an image.
+    pub fn mean(&self) -> Image {
+        image(self.size, self.values())
+    }
+
+    /// The errors of all pixels; `None` for a film of one replicate, which does not know them.
+    /// Noise is [moderated](moderate) by what is `alike`.
+    pub fn errors(&self, alike: Alike) -> Option<Vec<PixelError>> {
+        if self.replicates < 2 {
+            return None;
         }
+        let values: Vec<Rgb> = self.values().collect();
+        let mut errors = vec![PixelError::default(); values.len()];
+        for channel in 0..3 {
+            let scatters = self.scatters(channel);
+            let levels: Vec<f64> = values.iter().map(|value| value[channel].powi(2)).collect();
+            let expected = match alike {
+                Alike::Values => levels.clone(),
+                Alike::Neighbours => self.neighbourhood(&scatters),
+            };
+            let sampling = moderate(&scatters, &expected, self.replicates - 1);
+            let discretisation = discretisation(&self.differences(channel), &levels);
+            for (index, error) in errors.iter_mut().enumerate() {
+                error.sampling[channel] = sampling[index].sqrt();
+                error.discretisation[channel] = discretisation[index].sqrt();
+            }
+        }
+        Some(errors)
+    }
+
+    /// Relative errors of all pixels together, rms over mean; zero for a film of one replicate. The
+    /// scatters are averaged as they are: their mean is unbiased.
+    pub fn relative_error(&self) -> FilmError {
+        if self.replicates < 2 {
+            return FilmError::default();
+        }
+        let (mut level, mut noise, mut mesh) = (0.0, 0.0, 0.0);
+        for channel in 0..3 {
+            let values: Vec<f64> = self.values().map(|value| value[channel]).collect();
+            let levels: Vec<f64> = values.iter().map(|value| value * value).collect();
+            level += values.iter().sum::<f64>();
+            noise += self.scatters(channel).iter().sum::<f64>();
+            mesh += discretisation(&self.differences(channel), &levels)
+                .iter()
+                .sum::<f64>();
+        }
+        let count = 3.0 * self.pixels.len() as f64;
+        let relative = |square: f64| {
+            if square > 0.0 {
+                (square / count).sqrt() / (level / count)
+            } else {
+                0.0
+            }
+        };
+        FilmError {
+            sampling: relative(noise),
+            discretisation: relative(mesh),
+        }
+    }
+
+    /// Variance of each pixel's mean, as its replicates scatter.
+    fn scatters(&self, channel: usize) -> Vec<f64> {
+        self.pixels
+            .iter()
+            .map(|pixel| self.scatter(self.used(&pixel.means).map(|x| x[channel])))
+            .collect()
+    }
+
+    /// Each pixel's difference between meshes, with the variance of its noise.
+    fn differences(&self, channel: usize) -> Vec<(f64, f64)> {
+        let share = 1.0 / f64::from(self.replicates);
+        self.pixels
+            .iter()
+            .map(|pixel| {
+                let own = || self.used(&pixel.differences).map(|d| f64::from(d[channel]));
+                (own().sum::<f64>() * share, self.scatter(own()))
+            })
+            .collect()
+    }
+
+    /// An image of the film's size from one value a pixel.
+    pub fn image(&self, values: impl Iterator<Item = Rgb>) -> Image {
+        image(self.size, values)
+    }
+
+    fn used<'a, T: Copy>(
+        &self,
+        replicates: &'a [T; MAX_REPLICATES],
+    ) -> impl Iterator<Item = T> + Clone + 'a {
+        replicates.iter().copied().take(self.replicates as usize)
+    }
+
+    /// Variance of the mean of the replicates.
+    fn scatter(&self, values: impl Iterator<Item = f64> + Clone) -> f64 {
+        let count = f64::from(self.replicates);
+        let mean = values.clone().sum::<f64>() / count;
+        let squares: f64 = values.map(|value| (value - mean).powi(2)).sum();
+        squares / (count * (count - 1.0))
+    }
+
+    /// The mean over the up to eight neighbours of each pixel.
+    fn neighbourhood(&self, scatters: &[f64]) -> Vec<f64> {
+        let [width, height] = self.size;
+        (0..scatters.len())
+            .into_par_iter()
+            .map(|index| {
+                let (x, y) = (index % width, index / width);
+                let (mut sum, mut count) = (0.0, 0.0);
+                for row in y.saturating_sub(1)..(y + 2).min(height) {
+                    for column in x.saturating_sub(1)..(x + 2).min(width) {
+                        if (column, row) != (x, y) {
+                            sum += scatters[row * width + column];
+                            count += 1.0;
+                        }
+                    }
+                }
+                if count > 0.0 {
+                    sum / count
+                } else {
+                    scatters[index]
+                }
+            })
+            .collect()
+    }
+}
+
+fn image([width, height]: [usize; 2], values: impl Iterator<Item = Rgb>) -> Image {
+    Image {
+        width,
+        height,
+        pixels: values.map(|value| value.as_vec3().to_array()).collect(),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use luxel_solver::sampling::Stage;
+    use luxel_solver::sampling::hash::uniform;
 
     /// A uniform integer in 0..n from Weyl's sequence: equidistributed, so that the moments of
     /// many of them approach those of the uniform distribution.
@@ -166,22 +395,65 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new()
                 .num_threads(threads)
                 .build()
-                .expect("a thread pool");
-            let mut film = Film::new([37, 41]);
+                .expect("a pool of threads");
+            let mut film = Film::new([37, 41], 2);
             pool.install(|| {
-                film.expose(|first, pixels| {
+                film.expose(1, |first, pixels| {
                     for (i, pixel) in pixels.iter_mut().enumerate() {
-                        pixel.add(Rgb::splat((first + i) as f64));
-                        pixel.add(Rgb::splat(weyl((first + i) as u32)));
+                        pixel.add(0, Rgb::splat((first + i) as f64).into());
+                        pixel.add(1, Rgb::splat(weyl((first + i) as u32)).into());
                     }
                 });
             });
             film
         };
         let film = expose(1);
-        assert!(film.pixels().iter().all(|pixel| pixel.count() == 2));
         assert_eq!(film, expose(3));
-        assert_eq!(film.mean().pixels.len(), 37 * 41);
-        assert!(film.standard_error().is_some());
+        for (i, value) in film.values().enumerate() {
+            let expected = f64::midpoint(i as f64, weyl(i as u32));
+            assert!((value.x - expected).abs() < 1e-12, "pixel {i}");
+        }
+    }
+
+    #[test]
+    fn further_samples_weigh_as_much_as_the_first() {
+        let mut film = Film::new([1, 1], 1);
+        let add = |film: &mut Film, samples: u32, value: f64| {
+            film.expose(samples, |_, pixels| {
+                for _ in 0..samples {
+                    pixels[0].add(0, Rgb::splat(value).into());
+                }
+            });
+        };
+        add(&mut film, 1, 4.0);
+        add(&mut film, 3, 8.0);
+        assert_eq!(film.values().next(), Some(Rgb::splat(7.0)));
+        assert_eq!((film.samples(), film.errors(Alike::Neighbours)), (4, None));
+    }
+
+    /// Independent uniform noise of standard deviation σ = 1/√12 in each of four replicates: the
+    /// stated error is that of their mean, σ/2, and the mean over pixels of z² is one.
+    #[test]
+    fn noise_is_stated_as_it_is() {
+        let mut film = Film::new([64, 64], 4);
+        film.expose(1, |first, pixels| {
+            for (i, pixel) in pixels.iter_mut().enumerate() {
+                for replicate in 0..4 {
+                    let item = (first + i) as u64;
+                    let noise = uniform(1, Stage::CAMERA, item, u64::from(replicate));
+                    pixel.add(replicate, Rgb::splat(noise).into());
+                }
+            }
+        });
+        let errors = film.errors(Alike::Neighbours).expect("four replicates");
+        let z_squares: f64 = film
+            .values()
+            .zip(&errors)
+            .map(|(value, error)| ((value.x - 0.5) / error.sampling.x).powi(2))
+            .sum();
+        // Of 4096 values of z², whose standard deviation is about √2, the mean is known to 0.022.
+        let mean = z_squares / 4096.0;
+        assert!((mean - 1.0).abs() < 0.1, "{mean}");
+        assert!(errors.iter().all(|error| error.discretisation == Rgb::ZERO));
     }
 }

@@ -20,8 +20,10 @@ use crate::progress::Progress;
 use glam::DVec2;
 use luxel_scenes::Rgb;
 use luxel_solver::bvh::{Hit, Ray};
+use luxel_solver::gather::MAX_REPLICATES;
 use luxel_solver::sampling::{Sequence, Stage};
 use luxel_solver::world::World;
+use std::ops::{AddAssign, Mul};
 
 /// A camera ray in the unit frame. An eye far outside the scene is moved along its ray to where the
 /// scene's surroundings begin, so that f32 holds its position.
@@ -62,22 +64,62 @@ pub struct SampleKey {
     pub index: u32,
 }
 
+/// What a camera sample sees, in the integrator's unit.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Seen {
+    /// The value.
+    pub value: Rgb,
+    /// How it differs from what a coarser mesh would show; zero where nothing is looked up in a mesh.
+    pub mesh_difference: Rgb,
+}
+
+impl From<Rgb> for Seen {
+    /// A value that owes nothing to a mesh.
+    fn from(value: Rgb) -> Self {
+        Self {
+            value,
+            mesh_difference: Rgb::ZERO,
+        }
+    }
+}
+
+impl AddAssign for Seen {
+    fn add_assign(&mut self, other: Self) {
+        self.value += other.value;
+        self.mesh_difference += other.mesh_difference;
+    }
+}
+
+impl Mul<Seen> for Rgb {
+    type Output = Seen;
+
+    fn mul(self, seen: Seen) -> Seen {
+        Seen {
+            value: self * seen.value,
+            mesh_difference: self * seen.mesh_difference,
+        }
+    }
+}
+
 /// Computes what is seen along rays.
 pub trait Integrator: Sync {
-    /// Writes the value of each ray, in the integrator's unit, to `values`. The value of a ray
-    /// depends on the ray and its key alone, not on its batch.
+    /// Writes what each ray sees to `seen`. It depends on the ray and its key alone, not on the
+    /// batch.
     ///
     /// # Panics
     /// When the slices differ in length.
-    fn estimate(&self, rays: &[CameraRay], keys: &[SampleKey], values: &mut [Rgb]);
+    fn estimate(&self, rays: &[CameraRay], keys: &[SampleKey], seen: &mut [Seen]);
 }
 
-/// How many camera samples a pixel gets.
+/// Which camera samples of every pixel to take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Samples {
-    /// Independent replicates, at least one; from two on the film knows its standard error.
+    /// Independent replicates, from one to [`MAX_REPLICATES`]; from two on the film knows its
+    /// standard error.
     pub replicates: u32,
-    /// Samples of each replicate, at least one; powers of two fill the pixel best.
+    /// Samples of each replicate that the film holds already.
+    pub before: u32,
+    /// Samples of each replicate to add, at least one; powers of two fill the pixel best.
     pub per_replicate: u32,
     /// Seed of all randomness.
     pub seed: u64,
@@ -88,37 +130,60 @@ impl Samples {
     /// lose what the even filling gains, fewer make the standard error itself uncertain (one part
     /// in √(2(n − 1))).
     pub fn new(total: u32, seed: u64) -> Self {
-        let replicates = (1..=4)
+        let replicates = (1..=MAX_REPLICATES as u32)
             .rev()
             .find(|n| total.is_multiple_of(*n))
             .unwrap_or(1);
         Self {
             replicates,
+            before: 0,
             per_replicate: (total / replicates).max(1),
             seed,
         }
     }
+
+    /// Samples of a pixel after these.
+    pub fn total(&self) -> u32 {
+        self.replicates * (self.before + self.per_replicate)
+    }
 }
 
-/// Exposes a film of the camera's size: box filter, one value per pixel and replicate. The same
-/// bytes at any number of threads. Progress counts pixels.
+/// Exposes a film of the camera's size: box filter. The same bytes at any number of threads.
+/// Progress counts pixels.
 pub fn expose(
     integrator: &dyn Integrator,
     camera: &CameraFrame,
     samples: Samples,
     progress: &dyn Progress,
 ) -> Film {
+    let mut film = Film::new(camera.size(), samples.replicates);
+    expose_further(&mut film, integrator, camera, samples, progress);
+    film
+}
+
+/// Adds samples to a film. What `samples.before` says must be what the film holds: the sequences go
+/// on from there.
+///
+/// # Panics
+/// When the film's size or replicates differ.
+pub fn expose_further(
+    film: &mut Film,
+    integrator: &dyn Integrator,
+    camera: &CameraFrame,
+    samples: Samples,
+    progress: &dyn Progress,
+) {
     let [width, height] = camera.size();
-    let mut film = Film::new([width, height]);
+    assert_eq!(film.size(), [width, height], "the film fits the camera");
+    assert_eq!(film.replicates(), samples.replicates, "as many replicates");
     progress.start("rendering", (width * height) as u64);
-    film.expose(|first, pixels| {
+    film.expose(samples.per_replicate, |first, pixels| {
         let count = pixels.len();
-        let mut values = vec![Rgb::ZERO; count];
+        let mut seen = vec![Seen::default(); count];
         let mut rays = Vec::with_capacity(count);
         let mut keys = Vec::with_capacity(count);
         for replicate in 0..samples.replicates {
-            let mut sums = vec![Rgb::ZERO; count];
-            for index in 0..samples.per_replicate {
+            for index in samples.before..samples.before + samples.per_replicate {
                 rays.clear();
                 keys.clear();
                 for pixel in first..first + count {
@@ -133,19 +198,15 @@ pub fn expose(
                         index,
                     });
                 }
-                integrator.estimate(&rays, &keys, &mut values);
-                for (sum, value) in sums.iter_mut().zip(&values) {
-                    *sum += *value;
+                integrator.estimate(&rays, &keys, &mut seen);
+                for (pixel, seen) in pixels.iter_mut().zip(&seen) {
+                    pixel.add(replicate, *seen);
                 }
-            }
-            for (pixel, sum) in pixels.iter_mut().zip(&sums) {
-                pixel.add(*sum / f64::from(samples.per_replicate));
             }
         }
         progress.advance(count as u64);
     });
     progress.finish();
-    film
 }
 
 #[cfg(test)]

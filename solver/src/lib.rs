@@ -30,4 +30,6 @@ pub mod pilot;
 
 pub mod gather;
 
+pub mod adaptive;
+
 pub mod audit;

@@ -30,10 +30,7 @@ pub fn render(scene: &Path, options: &[&str]) -> Picture {
 /// When the picture has no layer of standard errors.
 #[track_caller]
 pub fn pixels(picture: &Picture) -> Vec<(Rgb, Rgb)> {
-    let errors = picture
-        .layers
-        .iter()
-        .find(|(name, _)| name == "standard_error");
+    let errors = picture.layers.iter().find(|(name, _)| name == "error");
     let (_, errors) = errors.expect("pictures carry their standard error");
     let vector = |pixel: &[f32; 3]| Rgb::from_array(pixel.map(f64::from));
     let values = picture.image.pixels.iter().map(vector);

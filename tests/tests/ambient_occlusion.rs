@@ -123,7 +123,9 @@ fn every_case_within_its_noise() {
             .zip(case.values.chunks(group_size));
         for (group, values) in groups {
             let first = &group[0];
-            let mut arguments = vec!["--quantity".to_owned(), "ao".to_owned()];
+            let mut arguments = ["--quantity", "ao", "--rays", "4096"]
+                .map(str::to_owned)
+                .to_vec();
             if let Some(length) = first.max_distance {
                 arguments.extend(["--max-distance".to_owned(), length.to_string()]);
             }

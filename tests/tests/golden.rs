@@ -46,7 +46,8 @@ const CAMERA: &str = "[[camera]]\nname = \"main\"\nposition = [1, 1, 1.9]\nlook_
 fn check(name: &str, toml: &str, options: &[&str]) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = scene_files::write(&still_life(), folder.path(), toml);
-    assert_golden(name, &render(&file, options).image, LIMIT);
+    let options = [options, &["--spp", "16"]].concat();
+    assert_golden(name, &render(&file, &options).image, LIMIT);
 }
 
 /// The block shows the floor and the walls mirrored; the ball, whose facets show as rings, shows the
@@ -78,7 +79,14 @@ fn ambient_occlusion() {
 /// Smooth on walls, creased at edges, shadows as soft as the patches are large.
 #[test]
 fn radiosity_view() {
-    let options = ["--integrator", "radiosity", "--size", "32x32"];
+    let options = [
+        "--integrator",
+        "radiosity",
+        "--size",
+        "32x32",
+        "--spp",
+        "16",
+    ];
     assert_golden(
         "radiosity_view",
         &render(&example("cornell"), &options).image,

@@ -1,7 +1,9 @@
 //! Options that every verb takes.
 
+use super::goal::{Goal, RelativeError};
 use clap::ValueEnum;
 use std::num::NonZeroUsize;
+use std::time::{Duration, Instant};
 
 /// Options that every verb takes, before or after its name. Verbs that do not sample ignore the
 /// seed, so that scripts can pass the same options to all.
@@ -11,6 +13,14 @@ pub(super) struct Common {
     /// Seed of all randomness: the same input and seed give the same bytes
     #[arg(long, global = true, value_name = "N", default_value_t = 0)]
     pub(super) seed: u64,
+
+    /// Relative error to reach, root mean square over mean of the receivers [default: 2%]
+    #[arg(long, global = true, value_name = "P%", value_parser = super::goal::parse_error, allow_hyphen_values = true)]
+    pub(super) error: Option<RelativeError>,
+
+    /// Time to spend, such as 30s: the smallest error that can be reached in it
+    #[arg(long, global = true, value_name = "T", value_parser = super::goal::parse_time, allow_hyphen_values = true)]
+    pub(super) time: Option<Duration>,
 
     /// Number of threads [default: all cores]; does not change results
     #[arg(short = 'j', long, global = true, value_name = "N")]
@@ -55,6 +65,11 @@ pub(super) enum ProgressMode {
 }
 
 impl Common {
+    /// What was asked for, by a run that began at `started`.
+    pub(super) fn goal(&self, started: Instant) -> Goal {
+        Goal::new(self.error, self.time, started)
+    }
+
     /// Runs `work` on a thread pool of the requested size.
     ///
     /// # Errors

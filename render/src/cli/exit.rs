@@ -18,6 +18,10 @@ pub enum ExitCode {
     NothingToDo = 4,
     /// A limit that the user set is exceeded: `check --strict`, `diff --max-rel-rmse`.
     LimitExceeded = 5,
+    /// The error that was asked for was not reached; the result is written and says what was.
+    TargetMissed = 6,
+    /// The user stopped it; the last complete result is written, if there was one.
+    Interrupted = 130,
 }
 
 impl From<ExitCode> for std::process::ExitCode {
@@ -86,6 +90,7 @@ exits_with! {
     crate::image::png::EncodePngError => Failure,
     luxel_solver::patches::MeshError => InvalidInput,
     luxel_solver::solvers::SystemError => InvalidInput,
+    luxel_solver::pilot::PilotError => InvalidInput,
     luxel_solver::solvers::DirectError => Failure,
     luxel_solver::solvers::NotReciprocal => InvalidInput,
     crate::ply::TooManyCorners => Failure,

@@ -10,14 +10,20 @@ mod dense;
 mod diff;
 mod exit;
 mod form_factors;
+mod goal;
+mod interrupt;
 mod probe;
+mod refine;
 mod render;
 mod reporter;
 mod scene;
 mod solve;
+mod stated;
+mod steering;
 mod transport;
 
 pub use exit::ExitCode;
+pub use interrupt::Interrupt;
 
 use clap::Parser;
 use common::Common;
@@ -58,6 +64,9 @@ struct Session<'a> {
 struct Context<'a> {
     common: Common,
     reporter: Reporter<'a>,
+    interrupt: Interrupt,
+    /// When the command began: times that are asked for include everything.
+    started: Instant,
 }
 
 impl Session<'_> {
@@ -80,17 +89,19 @@ pub fn run(
     stdout: &mut dyn Write,
     stderr: &mut (dyn Write + Send),
 ) -> ExitCode {
-    run_with(args, stdout, stderr, false)
+    run_with(args, stdout, stderr, false, Interrupt::default())
 }
 
 /// Runs the command with `args` (the program's name first). `terminal` says that stderr is a
-/// terminal, on which bars may be drawn.
+/// terminal, on which bars may be drawn. `interrupt` may be raised from another thread.
 pub fn run_with(
     args: impl IntoIterator<Item = impl Into<OsString> + Clone>,
     stdout: &mut dyn Write,
     stderr: &mut (dyn Write + Send),
     terminal: bool,
+    interrupt: Interrupt,
 ) -> ExitCode {
+    let started = Instant::now();
     let arguments = match Arguments::try_parse_from(args) {
         Ok(arguments) => arguments,
         Err(error) => return usage(&error, stdout, stderr),
@@ -99,10 +110,11 @@ pub fn run_with(
         context: Context {
             reporter: Reporter::new(stderr, terminal, &arguments.common),
             common: arguments.common,
+            interrupt,
+            started,
         },
         stdout,
     };
-    let started = Instant::now();
     let outcome = match arguments.verb {
         Verb::Render(verb) => verb.run(&mut session),
         Verb::Solve(verb) => verb.run(&mut session),

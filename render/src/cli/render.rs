@@ -1,34 +1,48 @@
 //! `luxel render`: a picture.
 
 use super::exit::{ExitCode, Failure};
+use super::goal::Goal;
+use super::refine::refine;
 use super::scene;
+use super::stated::StatedError;
+use super::steering::Steering;
 use super::transport::{Purpose, Transport};
 use super::{Context, Session};
 use crate::camera::CameraFrame;
 use crate::files::Output;
-use crate::film::Film;
+use crate::film::{Alike, Film, PixelError};
 use crate::image::exr::{Origin, Picture};
-use crate::image::{exr, png};
+use crate::image::{Image, exr, png};
 use crate::integrators::ao::{self, AmbientOcclusion, Falloff};
 use crate::integrators::gather::{self, Gatherer};
 use crate::integrators::path::PathTracer;
 use crate::integrators::radiosity::RadiosityView;
 use crate::integrators::whitted::{self, Highlight, Whitted};
-use crate::integrators::{Integrator, Samples, expose};
+use crate::integrators::{Integrator, Samples, expose_further, unit_ray};
+use crate::progress::Progress;
 use crate::tone_map::ToneMap;
 use crate::view::view;
 use clap::ValueEnum;
-use luxel_scenes::{Irradiance, Rgb};
+use glam::DVec2;
+use luxel_scenes::Irradiance;
+use luxel_solver::adaptive::{Adapted, AdaptiveConfig};
 use luxel_solver::audit;
-use luxel_solver::world::World;
+use luxel_solver::bvh::{Hit, Ray};
+use luxel_solver::gather::{Components, Lookup};
+use luxel_solver::world::{Receiver, World};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 /// Rays for indirect light of a camera sample: with 16 samples 256 a pixel.
 const GATHER_RAYS: usize = 16;
 
-/// Shadow rays of a camera sample.
+/// Shadow rays of a camera sample, unless a pilot says better.
 const SHADOW_RAYS: usize = 4;
+
+/// Patches of the solution for a fixed number of samples, or a time.
+const GATHER_PATCHES: usize = 6000;
+
+/// Samples of a pixel that a refinement begins with.
+const FIRST_SAMPLES: u32 = 8;
 
 /// Rays for ambient occlusion of a camera sample.
 const AO_RAYS: u32 = 8;
@@ -39,7 +53,8 @@ const WHITTED_DEPTH: u32 = 8;
 
 /// Render a picture
 ///
-/// The EXR file holds linear radiance (RGB) and its standard error (layer `standard_error`).
+/// The EXR file holds linear radiance (RGB), its estimated error (layer `error`, one standard
+/// deviation) and the part of it that patches make (layer `discretisation`).
 #[derive(clap::Args)]
 pub(super) struct Render {
     /// Scene file (.toml), or geometry (.obj, .gltf, .glb)
@@ -65,8 +80,8 @@ pub(super) struct Render {
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
 
-    /// Samples per pixel [default: 16; path: 64]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    /// Samples per pixel, whatever the error [default: as many as the error asks for]
+    #[arg(long, conflicts_with_all = ["error", "time"], value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     spp: Option<u32>,
 
     /// With --integrator ao: metres beyond which nothing occludes
@@ -112,38 +127,32 @@ impl Render {
                 "-o and --png name the same file",
             ));
         }
-        let started = Instant::now();
         let output = Output::prepare(&self.output)?;
         let preview = self.png.as_deref().map(Output::prepare).transpose()?;
 
         let scene = scene::read(&self.scene, &session.context)?;
         let camera = scene::camera(&scene, self.camera.as_deref())?;
         let frame = CameraFrame::new(camera, self.size.unwrap_or(camera.size))?;
-        let default = if self.integrator == Method::Path {
-            64
-        } else {
-            16
-        };
-        let samples = Samples::new(self.spp.unwrap_or(default), session.context.common.seed);
+        let context = &session.context;
+        let goal = context.common.goal(context.started);
+        let goal = self.spp.is_none().then_some(&goal);
 
-        let film = session.context.common.install(|| {
+        let exposed = context.common.install(|| {
             let world = World::new(&scene);
             if self.integrator != Method::Ao {
                 scene::require_light(&world)?;
             }
-            self.judge_view(&world, &camera.name, &frame, &session.context)?;
-            self.expose(&world, &frame, samples, &session.context)
+            self.judge_view(&world, &camera.name, &frame, context)?;
+            self.expose(&world, &frame, goal, context)
         })??;
+        let Some(Exposed { film, error }) = exposed else {
+            return Ok(ExitCode::Interrupted);
+        };
 
-        let image = film.mean();
-        let error = film.standard_error();
-        let noise = error.as_ref().map(|_| relative_noise(&film));
+        let samples = film.replicates() * film.samples();
         let picture = Picture {
-            layers: error
-                .map(|error| ("standard_error".into(), error))
-                .into_iter()
-                .collect(),
-            image,
+            layers: error_layers(&film),
+            image: film.mean(),
             origin: Some(Origin {
                 software: concat!("luxel ", env!("CARGO_PKG_VERSION")).into(),
                 scene: scene.name.clone(),
@@ -153,8 +162,8 @@ impl Render {
                     Method::Ao => "1".into(),
                     _ => scene::radiance_unit(scene.units).into(),
                 },
-                samples: samples.replicates * samples.per_replicate,
-                seed: session.context.common.seed,
+                samples,
+                seed: context.common.seed,
             }),
         };
         output.write(&exr::encode(&picture)?)?;
@@ -165,8 +174,12 @@ impl Render {
             };
             preview.write(&png::encode(&picture.image, tone_map)?)?;
         }
-        self.report(&frame, samples, noise, started, session)?;
-        Ok(ExitCode::Ok)
+        self.report(&frame, samples, error.as_ref(), goal, session)?;
+        Ok(if session.context.interrupt.is_set() {
+            ExitCode::Interrupted
+        } else {
+            error.map_or(ExitCode::Ok, |error| error.exit(goal))
+        })
     }
 
     /// Refuses a camera that sees nothing but backs, which are black; warns of one that sees mostly
@@ -188,47 +201,43 @@ impl Render {
         Ok(())
     }
 
+    /// The film; `None` when it was interrupted before the first sample.
     fn expose(
         &self,
         world: &World<'_>,
         frame: &CameraFrame,
-        samples: Samples,
+        goal: Option<&Goal>,
         context: &Context<'_>,
-    ) -> Result<Film, Failure> {
+    ) -> Result<Option<Exposed>, Failure> {
         let seed = context.common.seed;
-        let show =
-            |integrator: &dyn Integrator| expose(integrator, frame, samples, &context.reporter);
-        let config = gather::Config {
-            rays: GATHER_RAYS,
-            shadow_rays: SHADOW_RAYS,
-            seed,
+        let show = |integrator: &dyn Integrator, solver_bound: f64| {
+            Ok(self.refine(integrator, frame, solver_bound, goal, context))
         };
-        let film = match self.integrator {
-            Method::Ao => show(&AmbientOcclusion::new(
-                world,
-                ao::Config {
+        match self.integrator {
+            Method::Ao => {
+                let config = ao::Config {
                     rays: AO_RAYS,
                     max_distance: self.max_distance,
                     falloff: self.falloff,
                     seed,
-                },
-            )),
-            Method::Path => show(&PathTracer::new(world, seed)),
+                };
+                show(&AmbientOcclusion::new(world, config), 0.0)
+            }
+            Method::Path => show(&PathTracer::new(world, seed), 0.0),
             Method::Radiosity => {
                 let transport = Transport::solve(world, Purpose::View, context)?;
-                show(&RadiosityView::new(
-                    world,
-                    &transport.patches,
-                    &transport.solutions,
-                ))
+                let view = RadiosityView::new(world, &transport.patches, &transport.solutions);
+                show(&view, 0.0)
             }
             Method::Gather | Method::Whitted => {
-                let purpose = Purpose::Gather(samples.replicates);
-                let transport = Transport::solve(world, purpose, context)?;
-                let gatherer =
-                    Gatherer::new(world, &transport.patches, &transport.solutions, config);
+                let Some((lookup, config)) = prepare(world, frame, goal, context)? else {
+                    return Ok(None);
+                };
+                let gatherer = Gatherer::new(world, &lookup, config);
+                // What a bound on E leaves of L = ρE/π, for ρ up to one.
+                let solver_bound = lookup.solver_bound() / std::f64::consts::PI;
                 if self.integrator == Method::Gather {
-                    show(&gatherer)
+                    show(&gatherer, solver_bound)
                 } else {
                     let config = whitted::Config {
                         depth: WHITTED_DEPTH,
@@ -237,29 +246,63 @@ impl Render {
                         shadow_rays: SHADOW_RAYS,
                         seed,
                     };
-                    show(&Whitted::new(world, Some(gatherer), config))
+                    show(&Whitted::new(world, Some(gatherer), config), solver_bound)
                 }
             }
+        }
+    }
+
+    /// Exposes a film until the goal, or the number of samples, is reached.
+    fn refine(
+        &self,
+        integrator: &dyn Integrator,
+        frame: &CameraFrame,
+        solver_bound: f64,
+        goal: Option<&Goal>,
+        context: &Context<'_>,
+    ) -> Option<Exposed> {
+        let seed = context.common.seed;
+        let fixed = self.spp.map(|spp| Samples::new(spp, seed));
+        let first = fixed.unwrap_or(Samples::new(FIRST_SAMPLES, seed));
+        let mut film = Film::new(frame.size(), first.replicates);
+        let mut steering = Steering::new(context, goal);
+        let add = |film: &mut Film, samples: u32, progress: &dyn Progress| {
+            let samples = Samples {
+                before: film.samples(),
+                per_replicate: samples,
+                ..first
+            };
+            expose_further(film, integrator, frame, samples, progress);
         };
-        Ok(film)
+        let error = refine(&mut film, first.per_replicate, goal, &mut steering, add)?;
+        let level: f64 = film.values().map(|value| value.element_sum() / 3.0).sum();
+        let level = level / film.values().count() as f64;
+        let solver = if level > 0.0 {
+            solver_bound / level
+        } else {
+            0.0
+        };
+        let knows = film.replicates() > 1;
+        Some(Exposed {
+            error: knows
+                .then(|| StatedError::of_samples(error.sampling, error.discretisation, solver)),
+            film,
+        })
     }
 
     fn report(
         &self,
         frame: &CameraFrame,
-        samples: Samples,
-        noise: Option<f64>,
-        started: Instant,
+        samples: u32,
+        error: Option<&StatedError>,
+        goal: Option<&Goal>,
         session: &mut Session<'_>,
     ) -> Result<(), Failure> {
         let [width, height] = frame.size();
-        let spp = samples.replicates * samples.per_replicate;
-        let seconds = started.elapsed().as_secs_f64();
-        let stated = noise.map_or(String::new(), |noise| {
-            format!(", noise {:.2} % (rms over mean)", 100.0 * noise)
-        });
+        let seconds = session.context.started.elapsed().as_secs_f64();
+        let stated = error.map_or(String::new(), |error| format!("; {}", error.summary(goal)));
         session.context.reporter.note(format_args!(
-            "{width}x{height} pixels, {spp} samples each, {seconds:.2} s{stated}"
+            "{width}x{height} pixels, {samples} samples each, {seconds:.2} s{stated}"
         ));
         let path = |path: &Path| path.display().to_string();
         let text = if session.context.common.json {
@@ -268,8 +311,8 @@ impl Render {
                 "png": self.png.as_deref().map(path),
                 "integrator": super::name(&self.integrator),
                 "size": [width, height],
-                "samples": spp,
-                "error": { "noise": noise },
+                "samples": samples,
+                "error": error.map(|error| error.to_json(goal)),
                 "seconds": seconds,
             }))?
         } else {
@@ -281,17 +324,84 @@ impl Render {
     }
 }
 
-/// Root mean square of the standard errors over the mean of the picture.
-fn relative_noise(film: &Film) -> f64 {
-    let (mut squares, mut mean) = (0.0, 0.0);
-    for pixel in film.pixels() {
-        let error = pixel.standard_error().unwrap_or_default();
-        squares += error.dot(error) / 3.0;
-        mean += pixel.mean().dot(Rgb::ONE) / 3.0;
-    }
-    let count = film.pixels().len() as f64;
-    let (rms, mean) = ((squares / count).sqrt(), mean / count);
-    if mean > 0.0 { rms / mean } else { 0.0 }
+/// What was rendered.
+struct Exposed {
+    film: Film,
+    /// `None` for a single sample, which does not tell.
+    error: Option<StatedError>,
+}
+
+/// The estimated error of every pixel, and the part that patches make.
+fn error_layers(film: &Film) -> Vec<(String, Image)> {
+    let Some(errors) = film.errors(Alike::Neighbours) else {
+        return Vec::new();
+    };
+    vec![
+        (
+            "error".into(),
+            film.image(errors.iter().map(PixelError::total)),
+        ),
+        (
+            "discretisation".into(),
+            film.image(errors.iter().map(|error| error.discretisation)),
+        ),
+    ]
+}
+
+/// Solutions that are good enough for the goal at what the camera sees, and how to gather from them.
+fn prepare(
+    world: &World<'_>,
+    frame: &CameraFrame,
+    goal: Option<&Goal>,
+    context: &Context<'_>,
+) -> Result<Option<(Lookup, gather::Config)>, Failure> {
+    let seed = context.common.seed;
+    let mut steering = Steering::new(context, goal);
+    let scene = Adapted::new(world, seed)?;
+    let mut config = gather::Config {
+        rays: GATHER_RAYS,
+        shadow_rays: SHADOW_RAYS,
+        seed,
+    };
+    let seen = first_hits(world, frame);
+    let error = goal.and_then(|goal| goal.error);
+    let (Some(error), false) = (error, seen.is_empty()) else {
+        let solved = scene.solve(GATHER_PATCHES, &mut steering)?;
+        return Ok(solved.map(|lookup| (lookup, config)));
+    };
+    let wanted = AdaptiveConfig {
+        error: error.0,
+        components: Components::All,
+        seed,
+    };
+    let [width, height] = frame.size();
+    let prepared = scene.prepare(&seen, width * height, &wanted, &mut steering)?;
+    Ok(prepared.map(|(lookup, budget)| {
+        let ratio = budget.shadow_rays as f64 / budget.rays as f64;
+        let shadow_rays = (ratio * GATHER_RAYS as f64).round() as usize;
+        config.shadow_rays = shadow_rays.clamp(1, GATHER_RAYS);
+        (lookup, config)
+    }))
+}
+
+/// What the camera sees in a regular grid of pixels.
+fn first_hits(world: &World<'_>, frame: &CameraFrame) -> Vec<Receiver> {
+    /// Pixels along a side.
+    const GRID: usize = 24;
+    let [width, height] = frame.size();
+    let rays: Vec<Ray> = (0..GRID * GRID)
+        .map(|index| {
+            let along = |i: usize, side: usize| (i as f64 + 0.5) / GRID as f64 * side as f64;
+            let pixel = DVec2::new(along(index % GRID, width), along(index / GRID, height));
+            unit_ray(world, &frame.ray(pixel))
+        })
+        .collect();
+    let mut hits = vec![Hit::MISS; rays.len()];
+    world.bvh().closest_hits(&rays, &mut hits);
+    rays.iter()
+        .zip(&hits)
+        .filter_map(|(ray, hit)| Some(world.interaction(ray, hit)?.receiver))
+        .collect()
 }
 
 /// `WxH` in pixels.

@@ -221,6 +221,8 @@ mod tests {
     fn common(progress: ProgressMode, quiet: bool) -> Common {
         Common {
             seed: 0,
+            error: None,
+            time: None,
             jobs: None,
             progress,
             json: false,

@@ -1,4 +1,4 @@
-//! The radiosity solutions behind `render` and `probe`, with the defaults of both.
+//! The radiosity solutions that are shown or reported themselves, with their defaults.
 
 use super::Context;
 use super::exit::Failure;
@@ -7,15 +7,6 @@ use luxel_solver::patches::{PatchSize, Patches};
 use luxel_solver::radiosity::{RadiosityConfig, RadiositySolution, solve};
 use luxel_solver::solvers::{Config, Tolerance};
 use luxel_solver::world::World;
-
-/// Patches of the solution that a gather looks up. Measured at 1000 points of furnished and bare
-/// rooms: from 2500 to 8000 patches the error falls from 0.66 to 0.62 % (Cornell box), 1.15 to
-/// 0.82 % (corridor), 1.38 to 1.27 % (office) at 1.4 times the time.
-const GATHER_PATCHES: usize = 6000;
-
-/// Rays of a patch's row in each such solution. 64 measured no better; 16 biases the near classes,
-/// whose rows are then often empty.
-const GATHER_ROW_RAYS: usize = 32;
 
 /// Shadow rays of each sample point of a patch; four measured no better.
 const SHADOW_RAYS: usize = 1;
@@ -42,8 +33,6 @@ pub(super) struct Transport {
 /// What solutions are for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Purpose {
-    /// To be looked up by a gather; this many independent ones.
-    Gather(u32),
     /// To be shown.
     View,
     /// To be reported.
@@ -67,12 +56,6 @@ impl Transport {
         context: &Context<'_>,
     ) -> Result<Self, Failure> {
         let (size, rays, tolerance, replicates) = match purpose {
-            Purpose::Gather(replicates) => (
-                PatchSize::Count(GATHER_PATCHES),
-                GATHER_ROW_RAYS,
-                TOLERANCE,
-                replicates,
-            ),
             Purpose::View => (PatchSize::Count(VIEW_PATCHES), VIEW_ROW_RAYS, TOLERANCE, 1),
             Purpose::Solve {
                 size,

@@ -8,15 +8,14 @@
 //! Unbiased. Cost: one ray a sample.
 
 use super::vertex::Vertex;
-use super::{Integrator, SampleKey, cast};
+use super::{Integrator, SampleKey, Seen, cast};
 use crate::camera::CameraRay;
-use crate::film::Moments;
+use crate::film::Film;
 use crate::progress::Progress;
 use luxel_scenes::Rgb;
 use luxel_solver::bvh::{Hit, Ray};
 use luxel_solver::sampling::{Frame, Sequence, Stage, cosine_hemisphere};
 use luxel_solver::world::{Receiver, World};
-use rayon::prelude::*;
 
 /// How a blocker counts that is nearer than the maximum distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -55,42 +54,45 @@ impl<'w> AmbientOcclusion<'w> {
         Self { world, config }
     }
 
-    /// Ambient occlusion at receivers, the same in all channels, with the standard error from
-    /// `replicates` (at least two) independent sets of rays. Progress counts receivers.
+    /// Adds estimates of the ambient occlusion at receivers, the same in all channels, to a film of
+    /// one row: `samples` times the configured rays for each replicate. Progress counts receivers.
+    ///
+    /// # Panics
+    /// When the film has not one pixel for each receiver.
     pub fn at_receivers(
         &self,
+        film: &mut Film,
         receivers: &[Receiver],
-        replicates: u32,
+        samples: u32,
         progress: &dyn Progress,
-    ) -> Vec<Moments> {
+    ) {
+        assert_eq!(film.size(), [receivers.len(), 1], "a pixel a receiver");
         progress.start("ambient occlusion", receivers.len() as u64);
-        let moments = receivers
-            .par_iter()
-            .enumerate()
-            .map(|(index, receiver)| {
-                let keyed: Vec<_> = (0..replicates)
-                    .map(|replicate| {
-                        let item = index as u64 * u64::from(replicates) + u64::from(replicate);
-                        let key = SampleKey {
-                            item,
-                            replicate,
-                            index: 0,
-                        };
-                        Some((*receiver, key))
-                    })
-                    .collect();
-                let mut openness = vec![0.0; keyed.len()];
-                self.openness(&keyed, &mut openness);
-                let mut moments = Moments::default();
-                for open in openness {
-                    moments.add(Rgb::splat(open));
+        let (replicates, before) = (film.replicates(), film.samples());
+        film.expose(samples, |first, exposures| {
+            let mut openness = vec![0.0; exposures.len()];
+            for replicate in 0..replicates {
+                for index in before..before + samples {
+                    let keyed: Vec<_> = (first..first + exposures.len())
+                        .map(|receiver| {
+                            let item = receiver as u64 * u64::from(replicates);
+                            let key = SampleKey {
+                                item: item + u64::from(replicate),
+                                replicate,
+                                index,
+                            };
+                            Some((receivers[receiver], key))
+                        })
+                        .collect();
+                    self.openness(&keyed, &mut openness);
+                    for (exposure, &open) in exposures.iter_mut().zip(&openness) {
+                        exposure.add(replicate, Rgb::splat(open).into());
+                    }
                 }
-                progress.advance(1);
-                moments
-            })
-            .collect();
+            }
+            progress.advance(exposures.len() as u64);
+        });
         progress.finish();
-        moments
     }
 
     /// The mean of V for each receiver; 1 where there is none.
@@ -153,7 +155,7 @@ impl<'w> AmbientOcclusion<'w> {
 }
 
 impl Integrator for AmbientOcclusion<'_> {
-    fn estimate(&self, rays: &[CameraRay], keys: &[SampleKey], values: &mut [Rgb]) {
+    fn estimate(&self, rays: &[CameraRay], keys: &[SampleKey], seen: &mut [Seen]) {
         let (rays, hits) = cast(self.world, rays);
         let receivers: Vec<_> = rays
             .iter()
@@ -161,10 +163,10 @@ impl Integrator for AmbientOcclusion<'_> {
             .zip(keys)
             .map(|((ray, hit), key)| Some((Vertex::new(self.world, ray, hit)?.receiver(), *key)))
             .collect();
-        let mut openness = vec![0.0; values.len()];
+        let mut openness = vec![0.0; seen.len()];
         self.openness(&receivers, &mut openness);
-        for (value, openness) in values.iter_mut().zip(openness) {
-            *value = Rgb::splat(openness);
+        for (seen, openness) in seen.iter_mut().zip(openness) {
+            *seen = Rgb::splat(openness).into();
         }
     }
 }

@@ -8,12 +8,11 @@
 //! of the patches alone. Cost: rays + shadow rays for each camera sample.
 
 use super::vertex::Vertex;
-use super::{Integrator, SampleKey, background, cast};
+use super::{Integrator, SampleKey, Seen, background, cast};
 use crate::camera::CameraRay;
-use luxel_scenes::{Irradiance, Rgb};
-use luxel_solver::gather::{Components, GatherConfig, Key, gather};
-use luxel_solver::patches::Patches;
-use luxel_solver::radiosity::RadiositySolution;
+use luxel_solver::gather::{
+    Components, GatherConfig, Key, Lookup, SkyRays, Solutions, Tally, gather,
+};
 use luxel_solver::world::{Receiver, World};
 
 /// How much is spent on a camera sample.
@@ -30,34 +29,23 @@ pub struct Config {
 /// Irradiance at hits, from radiosity solutions.
 pub struct Gatherer<'w> {
     world: &'w World<'w>,
-    patches: &'w Patches,
-    solutions: &'w [RadiositySolution],
+    lookup: &'w Lookup,
     config: Config,
 }
 
 impl<'w> Gatherer<'w> {
-    /// A gatherer into `solutions` (at least one) over `patches` of `world`. Replicate r of a pixel
-    /// looks up solution r, modulo their number.
-    ///
-    /// # Panics
-    /// When there is no solution.
-    pub fn new(
-        world: &'w World<'w>,
-        patches: &'w Patches,
-        solutions: &'w [RadiositySolution],
-        config: Config,
-    ) -> Self {
-        assert!(!solutions.is_empty(), "a gather needs a solution");
+    /// A gatherer into what `lookup` holds of `world`. Replicate r of a pixel looks up solution r,
+    /// modulo their number.
+    pub fn new(world: &'w World<'w>, lookup: &'w Lookup, config: Config) -> Self {
         Self {
             world,
-            patches,
-            solutions,
+            lookup,
             config,
         }
     }
 
-    /// Irradiance at each receiver in W/m². The samples of all keys belong to one replicate.
-    pub(super) fn irradiance(&self, receivers: &[Receiver], keys: &[SampleKey]) -> Vec<Irradiance> {
+    /// What is gathered at each receiver. The samples of all keys belong to one replicate.
+    fn gather(&self, receivers: &[Receiver], keys: &[SampleKey]) -> Vec<Tally> {
         let Some(first) = keys.first() else {
             return Vec::new();
         };
@@ -70,31 +58,22 @@ impl<'w> Gatherer<'w> {
             .collect();
         let config = GatherConfig {
             rays: self.config.rays,
+            rays_before: 0,
             shadow_rays: self.config.shadow_rays,
-            replicates: 1,
+            sky: SkyRays::Gather,
+            gathers: 1,
+            solutions: Solutions::One(first.replicate as usize % self.lookup.solutions()),
             components: Components::All,
             seed: self.config.seed,
         };
-        let replicate = first.replicate as usize % self.solutions.len();
-        let solution = &self.solutions[replicate..=replicate];
-        gather(
-            self.world,
-            self.patches,
-            solution,
-            receivers,
-            &keys,
-            &config,
-        )
-        .into_iter()
-        .map(|gathered| gathered.irradiance())
-        .collect()
+        gather(self.world, Some(self.lookup), receivers, &keys, &config)
     }
 
-    /// Adds ρE/π of every diffuse vertex to the value of its slot.
+    /// Adds ρE/π of every diffuse vertex to what its slot sees.
     pub(super) fn add_reflected(
         &self,
         vertices: &[(usize, SampleKey, Vertex<'_>)],
-        values: &mut [Rgb],
+        seen: &mut [Seen],
     ) {
         let lit: Vec<_> = vertices
             .iter()
@@ -103,25 +82,29 @@ impl<'w> Gatherer<'w> {
             .collect();
         let receivers: Vec<Receiver> = lit.iter().map(|(.., receiver)| *receiver).collect();
         let keys: Vec<SampleKey> = lit.iter().map(|(_, key, ..)| *key).collect();
-        let irradiance = self.irradiance(&receivers, &keys);
-        for ((slot, _, reflectance, _), irradiance) in lit.iter().zip(irradiance) {
-            values[*slot] += (*reflectance * irradiance).to_radiance().0;
+        let tallies = self.gather(&receivers, &keys);
+        for ((slot, _, reflectance, _), tally) in lit.iter().zip(tallies) {
+            let radiance = |irradiance| (*reflectance * irradiance).to_radiance().0;
+            seen[*slot] += Seen {
+                value: radiance(tally.irradiance()),
+                mesh_difference: radiance(tally.mesh_difference()),
+            };
         }
     }
 }
 
 impl Integrator for Gatherer<'_> {
-    fn estimate(&self, rays: &[CameraRay], keys: &[SampleKey], values: &mut [Rgb]) {
+    fn estimate(&self, rays: &[CameraRay], keys: &[SampleKey], seen: &mut [Seen]) {
         let (rays, hits) = cast(self.world, rays);
         let mut vertices = Vec::with_capacity(rays.len());
         for (slot, (ray, hit)) in rays.iter().zip(&hits).enumerate() {
             let Some(vertex) = Vertex::new(self.world, ray, hit) else {
-                values[slot] = background(self.world, ray);
+                seen[slot] = background(self.world, ray).into();
                 continue;
             };
-            values[slot] = vertex.emission().0;
+            seen[slot] = vertex.emission().0.into();
             vertices.push((slot, keys[slot], vertex));
         }
-        self.add_reflected(&vertices, values);
+        self.add_reflected(&vertices, seen);
     }
 }

@@ -18,9 +18,9 @@
 use super::next_event::{connect, density, weight};
 use super::specular::{boundary, reflect};
 use super::vertex::Vertex;
-use super::{Integrator, SampleKey, background, unit_ray};
+use super::{Integrator, SampleKey, Seen, background, unit_ray};
 use crate::camera::CameraRay;
-use crate::film::Moments;
+use crate::film::Film;
 use crate::progress::Progress;
 use glam::DVec3;
 use luxel_scenes::{Radiance, Rgb, Specular};
@@ -28,7 +28,6 @@ use luxel_solver::bvh::{Hit, Ray};
 use luxel_solver::gather::Components;
 use luxel_solver::sampling::{Frame, Sequence, Stage, cosine_hemisphere};
 use luxel_solver::world::{Receiver, World};
-use rayon::prelude::*;
 
 /// Bounce from which roulette ends paths. Earlier, and the second reflection of rooms is noisy;
 /// later, and dark scenes pay for bounces that carry nothing.
@@ -86,54 +85,51 @@ impl<'w> PathTracer<'w> {
         Self { world, seed }
     }
 
-    /// Irradiance at receivers in W/m², of the given components: `replicates` (at least two)
-    /// independent estimates of `paths` paths each. Unbiased. Progress counts receivers.
+    /// Adds estimates of the irradiance at receivers in W/m², of the given components, to a film of
+    /// one row: one path a sample. Unbiased. Progress counts receivers.
+    ///
+    /// # Panics
+    /// When the film has not one pixel for each receiver.
     pub fn irradiance(
         &self,
+        film: &mut Film,
         receivers: &[Receiver],
         components: Components,
-        replicates: u32,
         paths: u32,
         progress: &dyn Progress,
-    ) -> Vec<Moments> {
+    ) {
+        assert_eq!(film.size(), [receivers.len(), 1], "a pixel a receiver");
         progress.start("tracing paths", receivers.len() as u64);
-        let mut moments = vec![Moments::default(); receivers.len()];
-        moments
-            .par_chunks_mut(RECEIVERS_PER_TASK)
-            .zip(receivers.par_chunks(RECEIVERS_PER_TASK))
-            .enumerate()
-            .for_each(|(task, (moments, receivers))| {
+        let (replicates, before) = (film.replicates(), film.samples());
+        film.expose(paths, |first, exposures| {
+            for (task, exposures) in exposures.chunks_mut(RECEIVERS_PER_TASK).enumerate() {
+                let first = first + task * RECEIVERS_PER_TASK;
+                let receivers = &receivers[first..first + exposures.len()];
                 let mut wave = Wave::default();
                 let mut sums = vec![Rgb::ZERO; receivers.len()];
                 for replicate in 0..replicates {
                     sums.fill(Rgb::ZERO);
-                    for index in 0..paths {
-                        let first = task * RECEIVERS_PER_TASK;
-                        let item = |slot: usize| {
-                            (first + slot) as u64 * u64::from(replicates) + u64::from(replicate)
+                    let item = |slot: usize| {
+                        (first + slot) as u64 * u64::from(replicates) + u64::from(replicate)
+                    };
+                    for index in before..before + paths {
+                        let key = |slot| SampleKey {
+                            item: item(slot),
+                            replicate,
+                            index,
                         };
-                        self.gather(
-                            &mut wave,
-                            receivers,
-                            |slot| SampleKey {
-                                item: item(slot),
-                                replicate,
-                                index,
-                            },
-                            components,
-                            &mut sums,
-                        );
+                        self.gather(&mut wave, receivers, key, components, &mut sums);
                     }
-                    for (moments, sum) in moments.iter_mut().zip(&sums) {
+                    for (exposure, sum) in exposures.iter_mut().zip(&sums) {
                         // The receivers reflected everything, so that L = E/π left them.
-                        let radiance = Radiance(*sum / f64::from(paths));
-                        moments.add(radiance.to_irradiance().0);
+                        let irradiance = Radiance(*sum).to_irradiance();
+                        exposure.add(replicate, irradiance.0.into());
                     }
                 }
                 progress.advance(receivers.len() as u64);
-            });
+            }
+        });
         progress.finish();
-        moments
     }
 
     /// Adds the radiance that perfectly white receivers reflect, one path each.
@@ -339,8 +335,8 @@ impl<'w> PathTracer<'w> {
 }
 
 impl Integrator for PathTracer<'_> {
-    fn estimate(&self, rays: &[CameraRay], keys: &[SampleKey], values: &mut [Rgb]) {
-        values.fill(Rgb::ZERO);
+    fn estimate(&self, rays: &[CameraRay], keys: &[SampleKey], seen: &mut [Seen]) {
+        let mut values = vec![Rgb::ZERO; rays.len()];
         let mut wave = Wave::default();
         let keyed = rays.iter().zip(keys).enumerate();
         wave.paths.extend(keyed.map(|(slot, (ray, key))| Path {
@@ -352,7 +348,10 @@ impl Integrator for PathTracer<'_> {
             bounce: 0,
             connected_from: None,
         }));
-        self.run(&mut wave, values);
+        self.run(&mut wave, &mut values);
+        for (seen, value) in seen.iter_mut().zip(values) {
+            *seen = value.into();
+        }
     }
 }
 

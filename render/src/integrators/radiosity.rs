@@ -7,7 +7,7 @@
 
 use super::smooth::SmoothField;
 use super::vertex::Vertex;
-use super::{Integrator, SampleKey, background, cast};
+use super::{Integrator, SampleKey, Seen, background, cast};
 use crate::camera::CameraRay;
 use luxel_scenes::{Irradiance, Rgb};
 use luxel_solver::patches::Patches;
@@ -63,13 +63,14 @@ impl<'w> RadiosityView<'w> {
 }
 
 impl Integrator for RadiosityView<'_> {
-    fn estimate(&self, rays: &[CameraRay], _keys: &[SampleKey], values: &mut [Rgb]) {
+    fn estimate(&self, rays: &[CameraRay], _keys: &[SampleKey], seen: &mut [Seen]) {
         let (rays, hits) = cast(self.world, rays);
-        for ((ray, hit), value) in rays.iter().zip(&hits).zip(values) {
-            *value = Vertex::new(self.world, ray, hit).map_or_else(
+        for ((ray, hit), seen) in rays.iter().zip(&hits).zip(seen) {
+            let value = Vertex::new(self.world, ray, hit).map_or_else(
                 || background(self.world, ray),
                 |vertex| vertex.emission().0 + self.reflected(&vertex),
             );
+            *seen = value.into();
         }
     }
 }

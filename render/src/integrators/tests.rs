@@ -7,14 +7,14 @@ use super::radiosity::RadiosityView;
 use super::whitted::{self, Highlight, Whitted};
 use super::*;
 use crate::camera::CameraFrame;
-use crate::film::Moments;
+use crate::film::{Alike, Moments};
 use crate::progress::Silent;
 use glam::DVec3;
 use luxel_scenes::{
     Camera, FieldOfView, Intensity, Irradiance, Light, LightKind, Material, Projection, Radiance,
     Reflectance, Scene, Specular,
 };
-use luxel_solver::gather::Components;
+use luxel_solver::gather::{Components, Lookup};
 use luxel_solver::patches::{PatchSize, Patches};
 use luxel_solver::radiosity::{RadiosityConfig, RadiositySolution, solve};
 use luxel_solver::solvers::{Config, Tolerance};
@@ -102,9 +102,9 @@ fn look(integrator: &dyn Integrator, camera: &CameraFrame) -> f64 {
         replicate: 0,
         index: 0,
     };
-    let mut value = [Rgb::ZERO];
-    integrator.estimate(&[ray], &[key], &mut value);
-    value[0].x
+    let mut seen = [Seen::default()];
+    integrator.estimate(&[ray], &[key], &mut seen);
+    seen[0].value.x
 }
 
 /// Mean and standard error of independent estimates along the middle ray.
@@ -118,11 +118,11 @@ fn look_often(integrator: &dyn Integrator, camera: &CameraFrame, count: u64) -> 
             index: 0,
         })
         .collect();
-    let mut values = vec![Rgb::ZERO; keys.len()];
-    integrator.estimate(&vec![ray; keys.len()], &keys, &mut values);
+    let mut seen = vec![Seen::default(); keys.len()];
+    integrator.estimate(&vec![ray; keys.len()], &keys, &mut seen);
     let mut moments = Moments::default();
-    for value in values {
-        moments.add(value);
+    for seen in seen {
+        moments.add(seen.value);
     }
     let error = moments.standard_error().expect("many estimates");
     (moments.mean().x, error.x)
@@ -145,14 +145,15 @@ fn the_furnace_glows_evenly_in_every_integrator() {
     let samples = Samples::new(4, 1);
 
     let view = RadiosityView::new(&world, &patches, &solutions);
-    for pixel in expose(&view, &frame, samples, &Silent).pixels() {
+    for value in expose(&view, &frame, samples, &Silent).values() {
         // What the iteration leaves.
-        let worst = (pixel.mean() - 2.0).abs().max_element();
+        let worst = (value - 2.0).abs().max_element();
         assert!(worst < 1e-6, "radiosity: off by {worst}");
     }
 
     // Roulette ends the paths and the near chains of gathers by chance: right on average.
-    let gatherer = || Gatherer::new(&world, &patches, &solutions, GATHER);
+    let lookup = Lookup::new(patches, &solutions);
+    let gatherer = || Gatherer::new(&world, &lookup, GATHER);
     let random: [(&str, Box<dyn Integrator>); 3] = [
         ("gather", Box::new(gatherer())),
         (
@@ -173,13 +174,20 @@ fn the_furnace_glows_evenly_in_every_integrator() {
 
 /// Mean of the red channel over a film, with its standard error.
 fn pooled(film: &Film) -> (f64, f64) {
-    let count = film.pixels().len() as f64;
-    let (mut mean, mut variance) = (0.0, 0.0);
-    for pixel in film.pixels() {
-        mean += pixel.mean().x / count;
-        variance += pixel.standard_error().expect("replicates").x.powi(2);
-    }
+    let errors = film.errors(Alike::Neighbours).expect("replicates");
+    let count = errors.len() as f64;
+    let mean = film.values().map(|value| value.x).sum::<f64>() / count;
+    let variance: f64 = errors.iter().map(|error| error.sampling.x.powi(2)).sum();
     (mean, variance.sqrt() / count)
+}
+
+/// What a film of one point holds, with its standard error: four replicates.
+fn at_a_point(add: impl Fn(&mut Film)) -> (f64, f64) {
+    let mut film = Film::new([1, 1], 4);
+    add(&mut film);
+    let errors = film.errors(Alike::Values).expect("replicates");
+    let value = film.values().next().expect("a value");
+    (value.x, errors[0].total().x)
 }
 
 #[test]
@@ -369,9 +377,7 @@ fn irradiance_by_paths_agrees_with_closed_forms() {
     let factor = 4.0 / std::f64::consts::TAU * (2.0 * s * s.atan());
     let tracer = PathTracer::new(&world, 1);
     let irradiance = |components| {
-        let moments = tracer.irradiance(&receivers, components, 16, 256, &Silent);
-        let error = moments[0].standard_error().expect("replicates").x;
-        (moments[0].mean().x, error)
+        at_a_point(|film| tracer.irradiance(film, &receivers, components, 1024, &Silent))
     };
     let expected = std::f64::consts::PI * factor;
     let (direct, error) = irradiance(Components::Direct);
@@ -401,10 +407,11 @@ fn a_uniform_sky_gives_an_open_point_pi_times_its_radiance() {
     });
     let world = World::new(&scene);
     let receivers = world.receivers(&[DVec3::ZERO], &[DVec3::Z]);
-    let moments =
-        PathTracer::new(&world, 1).irradiance(&receivers, Components::All, 2, 16, &Silent);
+    let tracer = PathTracer::new(&world, 1);
+    let (value, _) =
+        at_a_point(|film| tracer.irradiance(film, &receivers, Components::All, 8, &Silent));
     let expected = std::f64::consts::TAU;
-    assert!((moments[0].mean().x - expected).abs() < 1e-12);
+    assert!((value - expected).abs() < 1e-12);
 }
 
 const OCCLUSION: ao::Config = ao::Config {
@@ -424,9 +431,8 @@ fn occlusion_by_a_wall(distance: f64, config: ao::Config) -> (f64, f64) {
     rectangle(&mut scene, DVec3::Z * 0.5, long, DVec3::Z * 0.5, grey());
     let world = World::new(&scene);
     let receivers = world.receivers(&[DVec3::X * distance], &[DVec3::Z]);
-    let moments = AmbientOcclusion::new(&world, config).at_receivers(&receivers, 4, &Silent);
-    let error = moments[0].standard_error().expect("replicates").x;
-    (moments[0].mean().x, error)
+    let occlusion = AmbientOcclusion::new(&world, config);
+    at_a_point(|film| occlusion.at_receivers(film, &receivers, 1, &Silent))
 }
 
 #[test]
@@ -464,7 +470,8 @@ fn a_value_does_not_depend_on_its_batch() {
     let patches = world.mesh(PatchSize::Count(300)).expect("a mesh");
     let solutions = [solution(&world, &patches, 0)];
     let frame = CameraFrame::new(&scene.cameras[0], [16, 16]).expect("a valid camera");
-    let gatherer = Gatherer::new(&world, &patches, &solutions, GATHER);
+    let lookup = Lookup::new(patches, &solutions);
+    let gatherer = Gatherer::new(&world, &lookup, GATHER);
     let path = PathTracer::new(&world, 1);
     let rays: Vec<CameraRay> = (0..256)
         .map(|i| frame.ray(DVec2::new(f64::from(i % 16), f64::from(i / 16))))
@@ -477,9 +484,9 @@ fn a_value_does_not_depend_on_its_batch() {
         })
         .collect();
     for integrator in [&gatherer as &dyn Integrator, &path] {
-        let mut all = vec![Rgb::ZERO; 256];
+        let mut all = vec![Seen::default(); 256];
         integrator.estimate(&rays, &keys, &mut all);
-        let mut part = vec![Rgb::ZERO; 5];
+        let mut part = vec![Seen::default(); 5];
         integrator.estimate(&rays[100..105], &keys[100..105], &mut part);
         assert_eq!(part, all[100..105]);
     }

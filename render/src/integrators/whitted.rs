@@ -20,7 +20,7 @@
 use super::gather::Gatherer;
 use super::specular::{boundary, reflect};
 use super::vertex::Vertex;
-use super::{Integrator, SampleKey, background, unit_ray};
+use super::{Integrator, SampleKey, Seen, background, unit_ray};
 use crate::camera::CameraRay;
 use glam::DVec3;
 use luxel_scenes::{Irradiance, Rgb, Specular};
@@ -92,7 +92,7 @@ impl<'w> Whitted<'w> {
     }
 
     /// Shades all branches of one depth and returns those of the next.
-    fn shade(&self, branches: &[Branch], values: &mut [Rgb]) -> Vec<Branch> {
+    fn shade(&self, branches: &[Branch], seen: &mut [Seen]) -> Vec<Branch> {
         let rays: Vec<Ray> = branches.iter().map(|branch| branch.ray).collect();
         let mut hits = vec![Hit::MISS; rays.len()];
         self.world.bvh().closest_hits(&rays, &mut hits);
@@ -102,16 +102,16 @@ impl<'w> Whitted<'w> {
         let mut vertices = Vec::with_capacity(branches.len());
         for (index, (branch, hit)) in branches.iter().zip(&hits).enumerate() {
             let Some(vertex) = Vertex::new(self.world, &branch.ray, hit) else {
-                values[branch.slot] += branch.weight * background(self.world, &branch.ray);
+                seen[branch.slot] += (branch.weight * background(self.world, &branch.ray)).into();
                 continue;
             };
-            values[branch.slot] += branch.weight * vertex.emission().0;
+            seen[branch.slot] += (branch.weight * vertex.emission().0).into();
             vertices.push((index, branch.key, vertex));
             split(&vertex, branch, &mut next);
             self.highlight(&vertex, branch, &mut glints);
         }
-        self.add_diffuse(branches, &vertices, values);
-        self.add_glints(&glints, values);
+        self.add_diffuse(branches, &vertices, seen);
+        self.add_glints(&glints, seen);
         next
     }
 
@@ -120,20 +120,20 @@ impl<'w> Whitted<'w> {
         &self,
         branches: &[Branch],
         vertices: &[(usize, SampleKey, Vertex<'_>)],
-        values: &mut [Rgb],
+        seen: &mut [Seen],
     ) {
-        let mut reflected = vec![Rgb::ZERO; branches.len()];
+        let mut reflected = vec![Seen::default(); branches.len()];
         match &self.gatherer {
             Some(gatherer) => gatherer.add_reflected(vertices, &mut reflected),
             None => self.add_direct(vertices, &mut reflected),
         }
         for (branch, reflected) in branches.iter().zip(reflected) {
-            values[branch.slot] += branch.weight * reflected;
+            seen[branch.slot] += branch.weight * reflected;
         }
     }
 
     /// ρ(E^direct + ambient)/π of every vertex, into its slot.
-    fn add_direct(&self, vertices: &[(usize, SampleKey, Vertex<'_>)], values: &mut [Rgb]) {
+    fn add_direct(&self, vertices: &[(usize, SampleKey, Vertex<'_>)], seen: &mut [Seen]) {
         let samples: Vec<Sample> = vertices
             .iter()
             .map(|(_, key, vertex)| {
@@ -157,7 +157,7 @@ impl<'w> Whitted<'w> {
         sampler.irradiance(&samples, shadow_rays, &mut irradiance);
         for ((slot, _, vertex), irradiance) in vertices.iter().zip(irradiance) {
             let reflected = vertex.reflectance() * (irradiance + self.config.ambient);
-            values[*slot] += reflected.to_radiance().0;
+            seen[*slot] += reflected.to_radiance().0.into();
         }
     }
 
@@ -211,13 +211,13 @@ impl<'w> Whitted<'w> {
         }
     }
 
-    fn add_glints(&self, glints: &[Glint], values: &mut [Rgb]) {
+    fn add_glints(&self, glints: &[Glint], seen: &mut [Seen]) {
         let rays: Vec<Ray> = glints.iter().map(|glint| glint.ray).collect();
         let mut blocked = vec![false; rays.len()];
         self.world.bvh().occluded(&rays, &mut blocked);
         for (glint, blocked) in glints.iter().zip(blocked) {
             if !blocked {
-                values[glint.slot] += glint.radiance;
+                seen[glint.slot] += glint.radiance.into();
             }
         }
     }
@@ -274,8 +274,8 @@ fn split(vertex: &Vertex<'_>, branch: &Branch, next: &mut Vec<Branch>) {
 }
 
 impl Integrator for Whitted<'_> {
-    fn estimate(&self, rays: &[CameraRay], keys: &[SampleKey], values: &mut [Rgb]) {
-        values.fill(Rgb::ZERO);
+    fn estimate(&self, rays: &[CameraRay], keys: &[SampleKey], seen: &mut [Seen]) {
+        seen.fill(Seen::default());
         let samples = rays.iter().zip(keys).enumerate();
         let mut branches: Vec<Branch> = samples
             .map(|(slot, (ray, key))| Branch {
@@ -289,7 +289,7 @@ impl Integrator for Whitted<'_> {
             if branches.is_empty() {
                 break;
             }
-            branches = self.shade(&branches, values);
+            branches = self.shade(&branches, seen);
         }
     }
 }

@@ -206,7 +206,7 @@ pub(super) fn from_camera<'f>(
         let budget = format!("{samples} rays a pixel");
         pictures.push(Picture::new(Family::Gather, budget, &gathered.estimates));
     }
-    let traced = methods::path(world, &target, samples, methods::REPLICATES, setup.seed);
+    let traced = methods::path(world, &target, samples, setup.seed);
     let budget = format!("{samples} paths a pixel");
     pictures.push(Picture::new(Family::Path, budget, &traced.estimates));
     Ok(gallery(size, Some(&places), &reference, pictures))

@@ -4,14 +4,16 @@
 
 use super::checks::{Check, Energy};
 use super::target::{Kind, Target};
-use crate::film::Moments;
+use crate::film::{Alike, Film, Moments};
 use crate::integrators::gather::{Config as PixelGather, Gatherer};
 use crate::integrators::path::PathTracer;
 use crate::integrators::{Integrator, Samples, expose};
 use crate::points::Estimate;
 use crate::progress::Silent;
 use luxel_scenes::{Irradiance, Rgb};
-use luxel_solver::gather::{Components, GatherConfig, Key, gather};
+use luxel_solver::gather::{
+    Components, GatherConfig, Key, Lookup, SkyRays, Solutions, finish, gather,
+};
 use luxel_solver::patches::{MeshError, PatchSize, Patches};
 use luxel_solver::radiosity::{RadiosityConfig, RadiositySolution, solve};
 use luxel_solver::solvers::{Config, SystemError, Tolerance};
@@ -32,9 +34,9 @@ const SHADOW_RAYS: usize = 1;
 /// Most shadow rays of a point, as in the commands.
 const MAX_SHADOW_RAYS: usize = 1024;
 
-/// Most gather rays of a camera sample, as in the commands; with fewer for a pixel, a sample gets its share. A
-/// quarter as many shadow rays go with them.
+/// Gather rays and shadow rays of a camera sample, as in the commands.
 const PIXEL_RAYS: usize = 16;
+const PIXEL_SHADOW_RAYS: usize = 4;
 
 /// Bound on the error that the iteration may leave, relative to the brightest patch, as in the commands.
 const TOLERANCE: f64 = 1e-7;
@@ -165,80 +167,77 @@ pub(super) fn final_gather(
     seed: u64,
 ) -> Result<Outcome, MethodError> {
     let solved = solve_all(world, count, GATHER_ROW_RAYS, seed)?;
-    let (estimates, spent) = match target.kind() {
+    let coarse = solve_all(world, (count / 4).max(1), GATHER_ROW_RAYS, seed)?;
+    let (check, iterations) = (solved.check(), solved.iterations());
+    let solving = solved.rays + coarse.rays;
+    let lookup = Lookup::new(solved.patches, &solved.solutions)
+        .with_coarse(coarse.patches, &coarse.solutions);
+    let (found, spent) = match target.kind() {
         Kind::Points(receivers) => {
             let config = GatherConfig {
                 rays,
+                rays_before: 0,
                 shadow_rays: (rays * 3 / 4).clamp(1, MAX_SHADOW_RAYS),
-                replicates: REPLICATES,
+                sky: SkyRays::Apart,
+                gathers: REPLICATES,
+                solutions: Solutions::All,
                 components: Components::All,
                 seed,
             };
             let keys: Vec<Key> = (0..receivers.len() as u64).map(Key::of).collect();
-            let gathered = gather(
-                world,
-                &solved.patches,
-                &solved.solutions,
-                receivers,
-                &keys,
-                &config,
-            );
-            let estimates = gathered
-                .iter()
-                .map(|gathered| Estimate {
-                    value: gathered.irradiance().0,
-                    standard_error: gathered.standard_error.0,
+            let tallies = gather(world, Some(&lookup), receivers, &keys, &config);
+            let found = finish(&tallies)
+                .into_iter()
+                .map(|gathered| {
+                    let estimate = Estimate {
+                        value: gathered.irradiance().0,
+                        standard_error: gathered.sampling().0,
+                    };
+                    (estimate, gathered.discretisation.0)
                 })
                 .collect();
             let each = config.rays + config.shadow_rays;
-            (estimates, receivers.len() * each)
+            (found, receivers.len() * each)
         }
         Kind::Pixels(_) => {
-            let samples = (rays / PIXEL_RAYS).max(REPLICATES);
-            let rays = (rays / samples).max(1);
             let config = PixelGather {
-                rays,
-                shadow_rays: (rays / 4).max(1),
+                rays: PIXEL_RAYS,
+                shadow_rays: PIXEL_SHADOW_RAYS,
                 seed,
             };
-            let gatherer = Gatherer::new(world, &solved.patches, &solved.solutions, config);
-            let estimates = pixels(&gatherer, target, samples, seed);
-            let each = samples * (config.rays + config.shadow_rays);
-            (estimates, target.len() * each)
+            let gatherer = Gatherer::new(world, &lookup, config);
+            let samples = (rays / PIXEL_RAYS).max(REPLICATES);
+            let found = pixels(&gatherer, target, samples, seed);
+            let each = samples * (PIXEL_RAYS + PIXEL_SHADOW_RAYS);
+            (found, target.len() * each)
         }
     };
+    let (estimates, discretisation): (Vec<Estimate>, Vec<Rgb>) = found.into_iter().unzip();
     Ok(Outcome {
         estimates,
-        patches: Some(solved.patches.len()),
-        rays: solved.rays + spent as u64,
-        error_bound: solved.error_bound,
-        discretisation: None,
-        iterations: solved.iterations(),
-        check: Some(solved.check()),
+        patches: Some(lookup.patches().len()),
+        rays: solving + spent as u64,
+        error_bound: lookup.solver_bound(),
+        discretisation: Some(discretisation),
+        iterations,
+        check: Some(check),
         field: None,
     })
 }
 
-/// The path tracer with `paths` paths a receiver (a multiple of `replicates`).
-pub(super) fn path(
-    world: &World<'_>,
-    target: &Target,
-    paths: usize,
-    replicates: usize,
-    seed: u64,
-) -> Outcome {
+/// The path tracer with `paths` paths a receiver (a multiple of [`REPLICATES`]).
+pub(super) fn path(world: &World<'_>, target: &Target, paths: usize, seed: u64) -> Outcome {
     let tracer = PathTracer::new(world, seed);
-    let each = (paths / replicates).max(1);
-    let estimates = match target.kind() {
-        Kind::Points(receivers) => estimates(&tracer.irradiance(
-            receivers,
-            Components::All,
-            replicates as u32,
-            each as u32,
-            &Silent,
-        )),
+    let each = (paths / REPLICATES).max(1);
+    let found = match target.kind() {
+        Kind::Points(receivers) => {
+            let mut film = Film::new([receivers.len(), 1], REPLICATES as u32);
+            tracer.irradiance(&mut film, receivers, Components::All, each as u32, &Silent);
+            estimates_of(&film, Alike::Values)
+        }
         Kind::Pixels(_) => pixels(&tracer, target, paths, seed),
     };
+    let estimates = found.into_iter().map(|(estimate, _)| estimate).collect();
     Outcome {
         estimates,
         patches: None,
@@ -251,22 +250,40 @@ pub(super) fn path(
     }
 }
 
-/// A picture of `samples` samples a pixel, in as many replicates as everywhere.
+/// A picture of `samples` samples a pixel, in as many replicates as everywhere; also the
+/// discretisation error of each pixel.
 fn pixels(
     integrator: &dyn Integrator,
     target: &Target,
     samples: usize,
     seed: u64,
-) -> Vec<Estimate> {
+) -> Vec<(Estimate, Rgb)> {
     let Kind::Pixels(frame) = target.kind() else {
         return Vec::new();
     };
     let samples = Samples {
         replicates: REPLICATES as u32,
+        before: 0,
         per_replicate: (samples / REPLICATES).max(1) as u32,
         seed,
     };
-    estimates(expose(integrator, frame, samples, &Silent).pixels())
+    let film = expose(integrator, frame, samples, &Silent);
+    estimates_of(&film, Alike::Neighbours)
+}
+
+/// Estimates with their noise, and their discretisation errors.
+fn estimates_of(film: &Film, alike: Alike) -> Vec<(Estimate, Rgb)> {
+    let errors = film.errors(alike).unwrap_or_default();
+    film.values()
+        .zip(errors)
+        .map(|(value, error)| {
+            let estimate = Estimate {
+                value,
+                standard_error: error.sampling,
+            };
+            (estimate, error.discretisation)
+        })
+        .collect()
 }
 
 fn estimates(moments: &[Moments]) -> Vec<Estimate> {

@@ -229,7 +229,7 @@ pub fn own(
     }
     let seed = mix64(!seed);
     let started = Instant::now();
-    let run = |paths| methods::path(world, target, paths, REPLICATES, seed).estimates;
+    let run = |paths| methods::path(world, target, paths, seed).estimates;
     let paths = match effort {
         Effort::Paths(paths) => paths.max(REPLICATES),
         Effort::Seconds(seconds) => {

@@ -8,6 +8,8 @@
 //! | sampling | noise of rows, of shadow rays and of the gather | the scatter of independent randomisations, [moderated](moderate) |
 //! | discretisation | patches of finite size | two meshes looked up at the same hits ([`crate::gather`]) |
 
+mod discretisation;
 mod moderate;
 
+pub use discretisation::discretisation;
 pub use moderate::moderate;

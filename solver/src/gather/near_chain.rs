@@ -9,14 +9,16 @@
 //! Measured on furnished rooms: the error that finite patches make falls 1.3–3 times, and the
 //! relative error in dark places from 219 % to 4.5 %.
 
-use super::Key;
+use super::lookup::{Lookup, MAX_REPLICATES, PerSolution, Solutions};
+use super::{Key, Tally};
 use crate::bvh::{Hit, Ray};
 use crate::direct::{DirectSampler, Sample, ShadowRays};
-use crate::patches::Patches;
-use crate::radiosity::{Class, RadiositySolution};
+use crate::patches::Side;
 use crate::sampling::{self, Sequence, Stage, cosine_hemisphere};
 use crate::world::{Receiver, World};
-use luxel_scenes::{Irradiance, Rgb};
+use glam::Vec3;
+use luxel_scenes::{Irradiance, Rgb, Sidedness};
+use std::ops::Range;
 
 /// Links after which a chain is looked up wherever it is: light in crevices of that depth is
 /// below 1 % of what entered for ρ ≤ 0.75. More measured no different.
@@ -39,30 +41,77 @@ struct Path {
 /// What the rays of a receiver found, as sums of B over them.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Found {
-    /// Light of sources that shadow rays do not reach: the sky unless it is integrated apart, emission
+    /// Light of sources that shadow rays do not reach: the sky unless it has rays of its own, emission
     /// beyond the exact sources.
     pub(super) direct: Rgb,
-    /// Reflected light.
-    pub(super) indirect: Rgb,
+    /// Reflected light of chains: what is the same in every solution.
+    chained: Rgb,
+    /// Reflected light that was looked up, by solution.
+    looked_up: PerSolution,
+    /// What was looked up less what the coarser mesh shows there, by solution.
+    difference: PerSolution,
+    /// Squares of all contributions.
+    squares: Rgb,
     /// Rays that met the back of a one-sided face.
-    pub(super) backs: usize,
+    backs: u32,
 }
 
 impl Found {
-    /// Where light that is emitted where a chain's link ends belongs.
-    fn emitted(&mut self, link: u32) -> &mut Rgb {
+    /// Takes in light that is emitted where a chain's link ends.
+    fn add_emitted(&mut self, link: u32, light: Rgb) {
         if link == 0 {
-            &mut self.direct
+            self.squares += light * light;
+            self.direct += light;
         } else {
-            &mut self.indirect
+            self.add_chained(light);
         }
+    }
+
+    /// Takes in direct light that a near hit reflects.
+    fn add_chained(&mut self, light: Rgb) {
+        self.squares += light * light;
+        self.chained += light;
+    }
+
+    /// Takes in what was looked up at a hit.
+    fn look_up(
+        &mut self,
+        throughput: Rgb,
+        fine: &[Vec3],
+        coarse: Option<&[Vec3]>,
+        range: Range<usize>,
+    ) {
+        let share = 1.0 / range.len() as f64;
+        let mut mean = Rgb::ZERO;
+        for s in range {
+            let light = throughput * fine[s].as_dvec3();
+            self.looked_up[s] += light;
+            mean += light * share;
+            if let Some(coarse) = coarse {
+                self.difference[s] += light - throughput * coarse[s].as_dvec3();
+            }
+        }
+        self.squares += mean * mean;
+    }
+
+    /// Adds the indirect light to a tally.
+    pub(super) fn add_indirect_to(&self, tally: &mut Tally, gather: usize, solutions: usize) {
+        let looked_up: Rgb = self.looked_up.iter().sum();
+        tally.indirect[gather] += self.chained + looked_up / solutions.max(1) as f64;
+        for s in 0..MAX_REPLICATES {
+            tally.by_solution[s] += self.looked_up[s];
+            tally.difference[s] += self.difference[s];
+        }
+        tally.squares += self.squares;
+        tally.backs += self.backs;
     }
 }
 
 /// Scratch space for gathering a batch of receivers.
 pub(super) struct Chains<'a> {
     world: &'a World<'a>,
-    patches: &'a Patches,
+    lookup: Option<&'a Lookup>,
+    solutions: Solutions,
     /// Whether receivers get the light of the sky by other rays.
     sky_is_apart: bool,
     direct: DirectSampler<'a>,
@@ -72,10 +121,16 @@ pub(super) struct Chains<'a> {
 }
 
 impl<'a> Chains<'a> {
-    pub(super) fn new(world: &'a World<'a>, patches: &'a Patches, sky_is_apart: bool) -> Self {
+    pub(super) fn new(
+        world: &'a World<'a>,
+        lookup: Option<&'a Lookup>,
+        solutions: Solutions,
+        sky_is_apart: bool,
+    ) -> Self {
         Self {
             world,
-            patches,
+            lookup,
+            solutions,
             sky_is_apart,
             direct: DirectSampler::new(world.lights(), world.bvh()),
             paths: Vec::new(),
@@ -84,27 +139,27 @@ impl<'a> Chains<'a> {
         }
     }
 
-    /// Casts `rays` rays from each receiver and follows them; `add` is called once a receiver with
-    /// its position in the batch and what its rays found. Without a solution only the light of
-    /// sources that rays find is collected.
+    /// Casts `rays` rays from each receiver, after the `before` first of its sequence, and follows
+    /// them; `add` is called once a receiver with its position in the batch and what its rays found.
+    /// With nothing to look up only the light of sources that rays find is collected.
     pub(super) fn gather(
         &mut self,
-        solution: Option<&RadiositySolution>,
         receivers: &[Receiver],
         keys: &[Key],
         seed: u64,
-        rays: usize,
+        before: u32,
+        rays: u32,
         mut add: impl FnMut(usize, Found),
     ) {
         let mut found = vec![Found::default(); receivers.len()];
-        self.start(receivers, keys, seed, rays);
+        self.start(receivers, keys, seed, before, rays);
         for link in 0.. {
             if self.paths.is_empty() {
                 break;
             }
             self.hits.resize(self.rays.len(), Hit::MISS);
             self.world.bvh().closest_hits(&self.rays, &mut self.hits);
-            let near = self.look_up(solution, link, &mut found);
+            let near = self.look_up(link, &mut found);
             self.go_on(near, keys, seed, link, &mut found);
         }
         for (slot, found) in found.into_iter().enumerate() {
@@ -112,14 +167,14 @@ impl<'a> Chains<'a> {
         }
     }
 
-    fn start(&mut self, receivers: &[Receiver], keys: &[Key], seed: u64, rays: usize) {
+    fn start(&mut self, receivers: &[Receiver], keys: &[Key], seed: u64, before: u32, rays: u32) {
         self.paths.clear();
         self.rays.clear();
         for (slot, (receiver, key)) in receivers.iter().zip(keys).enumerate() {
             let sequence = Sequence::new(seed, Stage::GATHER, key.item);
             let frame = sampling::Frame::around(receiver.normal.as_vec3());
-            let first = key.index.wrapping_mul(rays as u32);
-            for ray in (0..rays as u32).map(|ray| first.wrapping_add(ray)) {
+            let first = before.wrapping_add(key.index.wrapping_mul(rays));
+            for ray in (0..rays).map(|ray| first.wrapping_add(ray)) {
                 let local = cosine_hemisphere::sample(sequence.point2_f32(ray));
                 self.rays
                     .push(Ray::new(receiver.origin, frame.to_world(local)));
@@ -133,12 +188,7 @@ impl<'a> Chains<'a> {
     }
 
     /// Adds what can be looked up; returns the paths that must go on, with the place to go on from.
-    fn look_up(
-        &self,
-        solution: Option<&RadiositySolution>,
-        link: u32,
-        found: &mut [Found],
-    ) -> Vec<(Path, Receiver)> {
+    fn look_up(&self, link: u32, found: &mut [Found]) -> Vec<(Path, Receiver)> {
         let surfaces = self.world.surfaces();
         let lights = self.world.lights();
         let mut near = Vec::new();
@@ -149,33 +199,33 @@ impl<'a> Chains<'a> {
                     continue;
                 }
                 let sky = lights.sky(surfaces, ray.direction.as_dvec3());
-                *found.emitted(link) += path.throughput * sky.to_irradiance().0;
+                found.add_emitted(link, path.throughput * sky.to_irradiance().0);
                 continue;
             };
-            let point = interaction.point;
-            let Some(patch) = self.patches.at(
-                surfaces.geometry(),
-                point.triangle,
-                point.u,
-                point.v,
-                interaction.side,
-            ) else {
-                found.backs += usize::from(link == 0);
+            let (point, side) = (interaction.point, interaction.side);
+            let one_sided = surfaces.material(interaction.face).sidedness == Sidedness::Front;
+            if side == Side::Back && one_sided {
+                found.backs += u32::from(link == 0);
                 continue;
-            };
+            }
             if !lights.is_source(interaction.face) {
                 let emitted = surfaces.emission(point).to_radiosity();
-                *found.emitted(link) += path.throughput * emitted.0;
+                found.add_emitted(link, path.throughput * emitted.0);
             }
-            let Some(solution) = solution else { continue };
+            let Some(lookup) = self.lookup else { continue };
             let throughput = path.throughput * surfaces.reflectance(point).0;
             if throughput == Rgb::ZERO {
                 continue;
             }
-            let size = self.patches.size(patch);
-            let class = Class::at(hit.t, size);
-            if hit.t >= REACH * size || link == MAX_LINKS {
-                found.indirect += throughput * solution.irradiance(patch, class).0;
+            let geometry = surfaces.geometry();
+            let patches = lookup.patches();
+            let Some(patch) = patches.at(geometry, point.triangle, point.u, point.v, side) else {
+                continue;
+            };
+            if hit.t >= REACH * patches.size(patch) || link == MAX_LINKS {
+                let fine = lookup.irradiance(patch, hit.t);
+                let coarse = lookup.coarse_irradiance(geometry, point, side, hit.t, REACH);
+                found.look_up(throughput, fine, coarse, lookup.range(self.solutions));
             } else {
                 near.push((
                     Path {
@@ -217,7 +267,7 @@ impl<'a> Chains<'a> {
         self.paths.clear();
         self.rays.clear();
         for ((mut path, receiver), direct) in near.into_iter().zip(direct) {
-            found[path.receiver as usize].indirect += path.throughput * direct.0;
+            found[path.receiver as usize].add_chained(path.throughput * direct.0);
             let u = sequence(&path, Stage::NEAR_CHAIN).point4_f32(path.ray);
             if link > 0 {
                 let survival = path.throughput.max_element().min(1.0);

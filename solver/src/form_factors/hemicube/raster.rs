@@ -121,9 +121,7 @@ impl Hemicube {
         };
         let offset = first - origin;
         let height = facet.normal.dot(offset);
-        // Both positions are rounded relative to their own size, however near they are to each other.
-        let size = offset.abs() + origin.abs() + first.abs();
-        let noise = 8.0 * f64::EPSILON * facet.normal.abs().dot(size);
+        let noise = 8.0 * f64::EPSILON * facet.normal.abs().dot(offset.abs());
         if height.abs() <= noise {
             return;
         }

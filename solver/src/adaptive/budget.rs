@@ -1,0 +1,263 @@
+//! How much to spend on what, so that the error asked for costs least.
+//!
+//! The squared error is a sum of parts that each fall with their own budget,
+//!
+//!   e² = Σ_k e_k² (x_k / x'_k)^(2 b_k),   cost = Σ_k c_k x'_k,
+//!
+//! where e_k was measured at the budget x_k. The cheapest x'_k for a given e satisfy
+//! 2 b_k e_k²(x'_k) = λ c_k x'_k with one λ for all (Lagrange): each part's squared error times its
+//! exponent is in proportion to what it costs. λ is found by bisection. Cost: nothing.
+//!
+//! Source: the allocation rule of stratified sampling (J. Neyman, "On the two different aspects of
+//! the representative method", 1934) with measured exponents in place of 1/2.
+
+use crate::gather::{ErrorParts, MAX_REPLICATES};
+
+/// What is spent. Rays are over all replicates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Budget {
+    /// Patches of the mesh that is looked up.
+    pub patches: usize,
+    /// Gather rays of a receiver.
+    pub rays: usize,
+    /// Shadow rays of a receiver.
+    pub shadow_rays: usize,
+}
+
+/// Rays of a patch's row in each solution. 64 measured no better per ray; 16 biases the near
+/// classes, whose rows are then often empty.
+pub const ROW_RAYS: usize = 32;
+
+/// Exponents with which errors fall, measured on the reference scenes: that of mesh and solution
+/// together with the number of patches (0.5 for the noise, 0.6 for the size), of gather rays
+/// (0.62–0.73) and of shadow rays (0.6–0.75). Too large, and a second round adds the missing rays;
+/// too small, and the first casts too many.
+const PATCH_EXPONENT: f64 = 0.55;
+const RAY_EXPONENT: f64 = 0.7;
+const SHADOW_EXPONENT: f64 = 0.7;
+
+/// Times in units of a gather ray with what follows it, measured on the reference scenes: a row's
+/// ray with its share of direct light (0.7–1.2), and a shadow ray (0.3–0.5). Only their rough ratio
+/// matters: a factor of two costs a few percent.
+const ROW_RAY_COST: f64 = 0.9;
+const SHADOW_RAY_COST: f64 = 0.4;
+
+/// Fewest of each, below which exponents do not hold, and most.
+const PATCHES: [usize; 2] = [300, 400_000];
+const RAYS: [usize; 2] = [64, 1 << 22];
+const SHADOW_RAYS: [usize; 2] = [48, 1 << 20];
+
+/// Rays of all receivers together that there are at least, and how many of them one receiver gets at
+/// most. What no ray has met, a small window, adds nothing to the scatter from which the error is
+/// judged: few rays of few receivers would agree on being wrong.
+const ALL_RAYS: usize = 1 << 16;
+const FEWEST_OF_ONE: usize = 1 << 12;
+
+/// Patches with which most rooms are within 1 % before their rays are counted, and how their number
+/// rises as the error falls.
+const PATCHES_AT_PERCENT: f64 = 1500.0;
+const PATCHES_EXPONENT: f64 = 1.2;
+
+impl Budget {
+    /// The budget of a pilot for a relative error: the mesh is meant to be kept, the rays are few.
+    pub fn pilot(error: f64) -> Self {
+        let patches = PATCHES_AT_PERCENT * (0.01 / error).powf(PATCHES_EXPONENT);
+        Self {
+            patches: (patches as usize).clamp(PATCHES[0], PATCHES[1] / 4),
+            rays: 2 * RAYS[0],
+            shadow_rays: 2 * SHADOW_RAYS[0],
+        }
+    }
+
+    /// A mesh and so many gather rays, with three shadow rays to four gather rays up to 1024, beyond
+    /// which the noise of direct light is most often small, and a share of a large budget. A `sky`
+    /// gets as many rays as the gather.
+    pub fn of_rays(patches: usize, rays: usize, sky: bool) -> Self {
+        const ENOUGH: usize = 1024;
+        let shadow_rays = if sky {
+            rays
+        } else {
+            (rays * 3 / 4).min(ENOUGH.max(rays / 16))
+        };
+        Self {
+            patches,
+            rays: rays.next_multiple_of(MAX_REPLICATES),
+            shadow_rays: shadow_rays.next_multiple_of(MAX_REPLICATES),
+        }
+    }
+
+    /// The cheapest budget for a relative error, from the errors that this one had.
+    #[must_use]
+    pub fn for_error(self, error: f64, parts: &ErrorParts, receivers: usize) -> Self {
+        let fewest = fewest_rays(receivers);
+        let receivers = receivers as f64;
+        let items = [
+            Item {
+                spent: self.patches as f64,
+                square: parts.solution.powi(2) + parts.mesh.powi(2),
+                exponent: PATCH_EXPONENT,
+                cost: patch_cost(),
+                limits: PATCHES,
+            },
+            Item {
+                spent: self.rays as f64,
+                square: parts.gather.powi(2),
+                exponent: RAY_EXPONENT,
+                cost: receivers,
+                limits: [fewest.max(RAYS[0]), RAYS[1]],
+            },
+            Item {
+                spent: self.shadow_rays as f64,
+                square: parts.direct.powi(2),
+                exponent: SHADOW_EXPONENT,
+                cost: receivers * SHADOW_RAY_COST,
+                limits: [fewest.max(SHADOW_RAYS[0]), SHADOW_RAYS[1]],
+            },
+        ];
+        let wanted = error * error;
+        // Bisection over the price of squared error, in logarithms.
+        let (mut low, mut high) = (-40.0_f64, 40.0_f64);
+        for _ in 0..80 {
+            let middle = 0.5 * (low + high);
+            let squares: f64 = items
+                .iter()
+                .map(|item| item.square_at(item.at_price(middle.exp())))
+                .sum();
+            if squares > wanted {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        let [patches, rays, shadow_rays] = items.map(|item| item.at_price(low.exp()).ceil());
+        Self {
+            patches: patches as usize,
+            rays: even(rays),
+            shadow_rays: even(shadow_rays),
+        }
+    }
+
+    /// Time of the rays of some receivers, in units of gather rays.
+    pub(super) fn gather_cost(&self, receivers: usize) -> f64 {
+        receivers as f64 * (self.rays as f64 + SHADOW_RAY_COST * self.shadow_rays as f64)
+    }
+
+    /// A share of the rays.
+    #[must_use]
+    pub(super) fn scaled(self, share: f64) -> Self {
+        let of = |rays: usize| even(rays as f64 * share.min(1.0));
+        Self {
+            rays: of(self.rays),
+            shadow_rays: of(self.shadow_rays),
+            ..self
+        }
+    }
+}
+
+/// Time of solving with so many patches, in units of gather rays, the coarser mesh included.
+pub(super) fn solve_cost(patches: usize) -> f64 {
+    patches as f64 * patch_cost()
+}
+
+/// Time of a patch in all its solutions, with its quarter of a patch of the coarser mesh.
+fn patch_cost() -> f64 {
+    1.25 * (MAX_REPLICATES * ROW_RAYS) as f64 * ROW_RAY_COST
+}
+
+/// Fewest rays of each of so many receivers.
+pub fn fewest_rays(receivers: usize) -> usize {
+    (ALL_RAYS / receivers.max(1)).min(FEWEST_OF_ONE)
+}
+
+/// As many for each replicate.
+fn even(rays: f64) -> usize {
+    (rays as usize).next_multiple_of(MAX_REPLICATES)
+}
+
+/// One part of the error with what lessens it.
+struct Item {
+    spent: f64,
+    square: f64,
+    exponent: f64,
+    cost: f64,
+    limits: [usize; 2],
+}
+
+impl Item {
+    fn square_at(&self, budget: f64) -> f64 {
+        self.square * (self.spent / budget).powf(2.0 * self.exponent)
+    }
+
+    /// What to spend when a unit of cost must buy `price` of squared error.
+    fn at_price(&self, price: f64) -> f64 {
+        let rate = 2.0 * self.exponent * self.square * self.spent.powf(2.0 * self.exponent);
+        let budget = (rate / (price * self.cost)).powf(1.0 / (2.0 * self.exponent + 1.0));
+        budget.clamp(self.limits[0] as f64, self.limits[1] as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPENT: Budget = Budget {
+        patches: 1500,
+        rays: 128,
+        shadow_rays: 96,
+    };
+
+    const PARTS: ErrorParts = ErrorParts {
+        direct: 0.004,
+        gather: 0.03,
+        solution: 0.003,
+        mesh: 0.004,
+    };
+
+    fn predicted(budget: Budget) -> f64 {
+        let fall = |from: usize, to: usize, b: f64| (from as f64 / to as f64).powf(2.0 * b);
+        ((PARTS.solution.powi(2) + PARTS.mesh.powi(2))
+            * fall(SPENT.patches, budget.patches, PATCH_EXPONENT)
+            + PARTS.gather.powi(2) * fall(SPENT.rays, budget.rays, RAY_EXPONENT)
+            + PARTS.direct.powi(2) * fall(SPENT.shadow_rays, budget.shadow_rays, SHADOW_EXPONENT))
+        .sqrt()
+    }
+
+    #[test]
+    fn the_budget_meets_the_error_and_no_cheaper_one_does() {
+        for error in [0.02, 0.01, 0.005, 0.001] {
+            let best = SPENT.for_error(error, &PARTS, 1000);
+            // Rounding up to whole rays gains less than a hundredth.
+            assert!(
+                (0.99 * error..=error).contains(&predicted(best)),
+                "{error}: {best:?} gives {}",
+                predicted(best)
+            );
+            // What is taken from one part must be given to another: shift a tenth of the rays.
+            let cost = |b: &Budget| solve_cost(b.patches) + b.gather_cost(1000);
+            for (patches, rays) in [(0.9, None), (1.1, None)].map(|(p, r)| (p, r.unwrap_or(p))) {
+                let other = Budget {
+                    patches: (best.patches as f64 / patches) as usize,
+                    rays: (best.rays as f64 * rays) as usize,
+                    ..best
+                };
+                let at_same_error = predicted(other) / predicted(best);
+                // Cost rises as error^-(1/b), b at least 0.55.
+                let worth = cost(&other) / cost(&best) * at_same_error.powf(1.0 / 0.7);
+                assert!(worth > 0.99, "{error}: {other:?} is worth {worth}");
+            }
+        }
+    }
+
+    #[test]
+    fn parts_without_error_cost_the_least_possible() {
+        let none = ErrorParts::default();
+        let least = SPENT.for_error(0.01, &none, 10_000);
+        assert_eq!(
+            (least.patches, least.rays, least.shadow_rays),
+            (PATCHES[0], RAYS[0], SHADOW_RAYS[0])
+        );
+        // What cannot be reached is approached as far as it goes.
+        let most = SPENT.for_error(1e-9, &PARTS, 10);
+        assert_eq!(most.rays, RAYS[1]);
+    }
+}
