@@ -121,7 +121,14 @@ impl Converge {
     ) -> Result<(), Failure> {
         for family in &study.families {
             let best = family.rows.iter().map(|row| row.error.nrmse);
-            let best = best.fold(f64::INFINITY, f64::min);
+            let Some(best) = best.min_by(f64::total_cmp) else {
+                let (title, reason) = (family.family.title(), &family.stopped);
+                session
+                    .context
+                    .reporter
+                    .note(format_args!("{title}: {reason}"));
+                continue;
+            };
             let sizes = family.rows.last().map_or(0, |row| row.step + 1);
             session.context.reporter.detail(format_args!(
                 "{}: {sizes} sizes, best nRMSE {:.3} %. {}",

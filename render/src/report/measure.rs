@@ -67,7 +67,11 @@ pub(super) fn measure(
         }
         let started = Instant::now();
         if let Err(reason) = one_step(setup, family, step, &mut result, &mut kept) {
-            result.stopped = format!("The next size was not run: {reason}.");
+            result.stopped = if step == 0 {
+                format!("Not run: {reason}.")
+            } else {
+                format!("The next size was not run: {reason}.")
+            };
             break;
         }
         next = started.elapsed().as_secs_f64() * family.growth();
@@ -90,11 +94,7 @@ fn one_step(
     if Family::CLASSICAL.contains(&family) {
         let rung = classical::rung(world, target, family, count, seed)
             .map_err(|error| error.to_string())?;
-        let known = result.rows.iter().rev();
-        if known
-            .into_iter()
-            .any(|row| row.patches == Some(rung.patches.len()))
-        {
+        if is_known(result, Some(rung.patches.len())) {
             return Ok(());
         }
         take_classical(setup, family, step, rung, result, kept);
@@ -107,7 +107,20 @@ fn one_step(
     }
     .map_err(|error| error.to_string())?;
     let seconds = started.elapsed().as_secs_f64();
+    if family == Family::Radiosity && is_known(result, outcome.patches) {
+        return Ok(());
+    }
     take(setup, family, step, outcome, seconds, result, kept)
+}
+
+/// True when the mesh of the last row has as many patches, within a tenth: small faces put a floor under the
+/// number of patches, so that the first sizes of a scene of many may all be one.
+fn is_known(result: &FamilyResult, patches: Option<usize>) -> bool {
+    let last = result.rows.last().and_then(|row| row.patches);
+    match (last, patches) {
+        (Some(last), Some(patches)) => (patches as f64) < 1.1 * last as f64,
+        _ => false,
+    }
 }
 
 /// Turns a size of a classical family into rows.

@@ -34,9 +34,9 @@ const SHADOW_RAYS: usize = 1;
 /// Most shadow rays of a point, as in the commands.
 const MAX_SHADOW_RAYS: usize = 1024;
 
-/// Gather rays and shadow rays of a camera sample, as in the commands.
+/// Most gather rays of a camera sample, as in the commands; with fewer for a pixel, a sample gets its share. A
+/// quarter as many shadow rays go with them.
 const PIXEL_RAYS: usize = 16;
-const PIXEL_SHADOW_RAYS: usize = 4;
 
 /// Bound on the error that the iteration may leave, relative to the brightest patch, as in the commands.
 const TOLERANCE: f64 = 1e-7;
@@ -200,15 +200,16 @@ pub(super) fn final_gather(
             (found, receivers.len() * each)
         }
         Kind::Pixels(_) => {
+            let samples = (rays / PIXEL_RAYS).max(REPLICATES);
+            let rays = (rays / samples).max(1);
             let config = PixelGather {
-                rays: PIXEL_RAYS,
-                shadow_rays: PIXEL_SHADOW_RAYS,
+                rays,
+                shadow_rays: (rays / 4).max(1),
                 seed,
             };
             let gatherer = Gatherer::new(world, &lookup, config);
-            let samples = (rays / PIXEL_RAYS).max(REPLICATES);
             let found = pixels(&gatherer, target, samples, seed);
-            let each = samples * (PIXEL_RAYS + PIXEL_SHADOW_RAYS);
+            let each = samples * (config.rays + config.shadow_rays);
             (found, target.len() * each)
         }
     };

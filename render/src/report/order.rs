@@ -28,6 +28,10 @@ pub struct Fit {
     pub points: usize,
 }
 
+/// Least sum of squared distances of ln x from their mean: two sizes a fifth apart. Sizes nearer than that show
+/// their scatter and no slope.
+const MIN_SPREAD: f64 = 0.02;
+
 /// The order at which errors fall as x grows, from pairs (x, e); pairs that are not positive are left
 /// out. `None` for fewer than two different x.
 pub fn fit(pairs: impl IntoIterator<Item = (f64, f64)>) -> Option<Fit> {
@@ -40,8 +44,7 @@ pub fn fit(pairs: impl IntoIterator<Item = (f64, f64)>) -> Option<Fit> {
     let mean_x = logs.iter().map(|(x, _)| x).sum::<f64>() / count;
     let mean_y = logs.iter().map(|(_, y)| y).sum::<f64>() / count;
     let spread: f64 = logs.iter().map(|(x, _)| (x - mean_x).powi(2)).sum();
-    // Equal sizes leave a spread of rounding.
-    if logs.len() < 2 || spread < 1e-9 {
+    if logs.len() < 2 || spread < MIN_SPREAD {
         return None;
     }
     let along: f64 = logs.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();

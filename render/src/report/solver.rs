@@ -48,8 +48,8 @@ pub struct Rate {
     pub meaning: &'static str,
 }
 
-/// Patches up to which LU factors are worth their n³: 2 s a channel at this size.
-const MAX_DIRECT: usize = 1500;
+/// Patches up to which LU factors are worth their n³: 0.2 s a channel at this size.
+const MAX_DIRECT: usize = 800;
 
 /// Patches up to which shooting is tried, whose search for the brightest costs n² a sweep, and up to which
 /// sparse rows are made reciprocal, which stores each entry twice.

@@ -115,7 +115,7 @@ pub(super) fn parts(study: &Study) -> String {
         ]
     });
     format!(
-        "<p>Shares of the squared error of the smallest and the largest size of each method.</p>\n<p>{}</p>\n\
+        "<p>Shares of the squared error of the smallest and the largest size of each method.</p>\n<p class=\"legend\">{}</p>\n\
          <figure class=\"bars\">{}<figcaption>Discretisation is what the true error holds beside the stated parts: the mesh, \
          and the bias of form factors.</figcaption></figure>\n<h3>The parts as the methods state them</h3>\n{}",
         concat(legend),

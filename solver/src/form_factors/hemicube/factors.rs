@@ -73,11 +73,18 @@ fn hemicube_rows<'a>(
                 let mut turn = 0.0;
                 let area: f64 = patch(i).iter().map(Polygon::area).sum();
                 for polygon in patch(i) {
+                    // An origin lies on its own polygon up to rounding: seen from 1e-17 behind, that
+                    // would hide everything.
+                    let others: Vec<Facet> = facets
+                        .iter()
+                        .filter(|facet| facet.vertices != polygon.vertices())
+                        .copied()
+                        .collect();
                     for (origin, share) in origins(polygon, config.origins) {
                         turn = (turn + GOLDEN) % 1.0;
                         let angle = turn * FRAC_PI_2;
                         let weight = share * polygon.area() / area;
-                        cube.add(origin, polygon.normal(), angle, facets, weight, &mut row);
+                        cube.add(origin, polygon.normal(), angle, &others, weight, &mut row);
                     }
                 }
                 row
@@ -102,6 +109,72 @@ mod tests {
     use super::super::raster::FacetSide;
     use super::*;
     use crate::transport::Transport;
+
+    /// A closed box in a position where no coordinate is round: the points of a wall lie on its plane only
+    /// up to rounding, and neither the wall nor its neighbours may hide the box from them.
+    #[test]
+    fn a_turned_box_is_closed_exactly() {
+        let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.7, 1.1);
+        let at = |x: f64, y: f64, z: f64| turn * DVec3::new(x, 0.7 * y, 1.3 * z) + 0.1;
+        let walls = [
+            [
+                at(0., 0., 0.),
+                at(0., 1., 0.),
+                at(0., 1., 1.),
+                at(0., 0., 1.),
+            ],
+            [
+                at(1., 0., 0.),
+                at(1., 0., 1.),
+                at(1., 1., 1.),
+                at(1., 1., 0.),
+            ],
+            [
+                at(0., 0., 0.),
+                at(0., 0., 1.),
+                at(1., 0., 1.),
+                at(1., 0., 0.),
+            ],
+            [
+                at(0., 1., 0.),
+                at(1., 1., 0.),
+                at(1., 1., 1.),
+                at(0., 1., 1.),
+            ],
+            [
+                at(0., 0., 0.),
+                at(1., 0., 0.),
+                at(1., 1., 0.),
+                at(0., 1., 0.),
+            ],
+            [
+                at(0., 0., 1.),
+                at(0., 1., 1.),
+                at(1., 1., 1.),
+                at(1., 0., 1.),
+            ],
+        ];
+        let polygons = walls.map(|corners| Polygon::new(&corners).expect("a rectangle"));
+        let facets: Vec<Facet> = polygons
+            .iter()
+            .enumerate()
+            .map(|(index, polygon)| Facet {
+                vertices: polygon.vertices(),
+                normal: polygon.normal(),
+                front: FacetSide::Counted(index as u32),
+                back: FacetSide::Black,
+            })
+            .collect();
+        let matrix = hemicube(&polygons, &facets, &HemicubeConfig::balanced(64));
+        for wall in 0..6 {
+            // A sum of 64 pixels squared, each exact to rounding.
+            assert!(
+                (matrix.row_sum(wall) - 1.0).abs() < 1e-12,
+                "{}",
+                matrix.row_sum(wall)
+            );
+        }
+    }
 
     #[test]
     fn a_closed_cube_is_closed_exactly_and_right_at_first_order() {

@@ -121,7 +121,9 @@ impl Hemicube {
         };
         let offset = first - origin;
         let height = facet.normal.dot(offset);
-        let noise = 8.0 * f64::EPSILON * facet.normal.abs().dot(offset.abs());
+        // Both positions are rounded relative to their own size, however near they are to each other.
+        let size = offset.abs() + origin.abs() + first.abs();
+        let noise = 8.0 * f64::EPSILON * facet.normal.abs().dot(size);
         if height.abs() <= noise {
             return;
         }
