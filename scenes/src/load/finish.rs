@@ -1,6 +1,7 @@
 //! The last checks on a scene, after all files have spoken: units, materials, extent.
 
 use super::Loaded;
+use super::duplicates::drop_duplicates;
 use super::error::{ExtentError, LoadError, MaterialError, MaterialProblem};
 use super::part::{MaterialSource, Merged};
 use super::place::Place;
@@ -42,6 +43,7 @@ pub(super) fn finish(
         ..
     } = merged;
     scene.name = name;
+    warnings.extend(drop_duplicates(&mut scene, file));
     if scene.faces.is_empty() {
         let place = Place::file(file);
         warnings.push(Warning::NoFaces { place });

@@ -1,5 +1,6 @@
 //! The one way in: [`load`] reads a scene from any of its files.
 
+mod duplicates;
 mod error;
 mod finish;
 mod part;

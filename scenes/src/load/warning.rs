@@ -15,6 +15,13 @@ pub enum Warning {
         /// The first.
         first: FacePlace,
     },
+    /// Faces with the corners and the front of an earlier one were dropped.
+    DuplicateFaces {
+        /// How many.
+        count: usize,
+        /// The first.
+        first: FacePlace,
+    },
     /// Flat faces that are not convex were cut into triangles.
     ConcaveFaces {
         /// How many.
@@ -120,6 +127,11 @@ impl fmt::Display for Warning {
             Self::DegenerateFaces { count, first } => write!(
                 f,
                 "{}: {count} face(s) without area dropped, the first is {first}",
+                first.place
+            ),
+            Self::DuplicateFaces { count, first } => write!(
+                f,
+                "{}: {count} face(s) that are there before dropped, the first is {first}",
                 first.place
             ),
             Self::ConcaveFaces { count, first } => write!(
