@@ -8,6 +8,7 @@ mod determinism;
 mod enclosures;
 mod form_factors;
 mod golden;
+mod hard_cases;
 mod hemicube;
 mod irradiance_fields;
 mod leaks;
