@@ -9,7 +9,6 @@ pub mod gather;
 mod next_event;
 pub mod path;
 pub mod radiosity;
-mod smooth;
 mod specular;
 mod vertex;
 pub mod whitted;

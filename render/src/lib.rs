@@ -12,9 +12,11 @@
     )
 )]
 
+pub mod accuracy;
 pub mod camera;
 pub mod cli;
 pub mod diff;
+pub mod display;
 pub mod files;
 pub mod film;
 pub mod image;

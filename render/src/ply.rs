@@ -2,7 +2,8 @@
 //!
 //! Little-endian `binary_little_endian 1.0`: positions in metres (`double`), the tone-mapped
 //! colour that viewers show (`red`, `green`, `blue`, 8 bits sRGB), the radiosity itself
-//! (`radiosity_r`, `_g`, `_b`, W/m², `float`), and polygons. Source: G. Turk, "The PLY polygon file
+//! (`radiosity_r`, `_g`, `_b`, W/m², `float`), its standard error (`standard_error_r`, `_g`, `_b`, W/m²,
+//! `float`), and polygons. Source: G. Turk, "The PLY polygon file
 //! format", Stanford University, 1994.
 
 use crate::image::Image;
@@ -18,6 +19,8 @@ pub struct Vertex {
     pub position: DVec3,
     /// Radiosity B in W/m².
     pub radiosity: Radiosity,
+    /// One standard deviation of its error in W/m².
+    pub standard_error: Radiosity,
 }
 
 /// Polygons with a radiosity at every vertex.
@@ -52,6 +55,9 @@ impl Mesh {
         for channel in ["r", "g", "b"] {
             let _ = writeln!(header, "property float radiosity_{channel}");
         }
+        for channel in ["r", "g", "b"] {
+            let _ = writeln!(header, "property float standard_error_{channel}");
+        }
         let _ = writeln!(header, "element face {}", self.faces.len());
         header += "property list uchar uint vertex_indices\nend_header\n";
 
@@ -73,7 +79,8 @@ impl Mesh {
                 bytes.extend(coordinate.to_le_bytes());
             }
             bytes.extend(tone_map.apply(radiosity));
-            for channel in radiosity {
+            let error = vertex.standard_error.0.as_vec3().to_array();
+            for channel in radiosity.into_iter().chain(error) {
                 bytes.extend(channel.to_le_bytes());
             }
         }
@@ -96,6 +103,7 @@ mod tests {
         let vertex = |x: f64| Vertex {
             position: DVec3::new(x, 0.25, 0.0),
             radiosity: Radiosity::new(x, 2.0, 0.0),
+            standard_error: Radiosity::splat(0.5),
         };
         let mesh = Mesh {
             vertices: vec![vertex(0.0), vertex(1.0), vertex(2.0)],
@@ -110,9 +118,9 @@ mod tests {
             + marker.len();
         let header = std::str::from_utf8(&bytes[..start]).expect("text");
         assert!(header.starts_with("ply\n") && header.contains("element vertex 3\n"));
-        // 3 doubles, 3 bytes and 3 floats a vertex; a count and 3 indices for the face.
-        assert_eq!(bytes.len() - start, 3 * (24 + 3 + 12) + 1 + 12);
-        let second = &bytes[start + 39..start + 78];
+        // 3 doubles, 3 bytes and 6 floats a vertex; a count and 3 indices for the face.
+        assert_eq!(bytes.len() - start, 3 * (24 + 3 + 24) + 1 + 12);
+        let second = &bytes[start + 51..start + 102];
         assert_eq!(second[..8], 1.0_f64.to_le_bytes());
         assert_eq!(second[27..31], 1.0_f32.to_le_bytes());
         assert_eq!(bytes[bytes.len() - 13], 3);

@@ -1,6 +1,10 @@
 //! Radiosity solutions summed up by object, for reports and meshes.
 
-use luxel_scenes::{Exitance, FaceId, Flux, Irradiance, ObjectId, Radiosity};
+use crate::accuracy::{Accuracy, Replicates};
+use crate::display::Display;
+use crate::ply::{Mesh, Vertex};
+use glam::DVec3;
+use luxel_scenes::{Exitance, FaceId, Flux, Irradiance, ObjectId, Radiosity, Rgb};
 use luxel_solver::patches::{PatchId, Patches};
 use luxel_solver::world::World;
 
@@ -23,6 +27,8 @@ pub struct ObjectLight {
     pub radiosity: Radiosity,
     /// Mean irradiance over its lit sides in W/m².
     pub irradiance: Irradiance,
+    /// One standard deviation of the error of the mean radiosity in W/m², where it is known.
+    pub standard_error: Option<Radiosity>,
 }
 
 impl PatchLight {
@@ -82,24 +88,116 @@ impl PatchLight {
                 area: areas[object],
                 radiosity: radiosity[object] * (1.0 / lit[object]),
                 irradiance: irradiance[object] * (1.0 / lit[object]),
+                standard_error: None,
             })
             .collect()
     }
 
-    /// The patches as a mesh, each with its radiosity, not interpolated.
-    pub fn mesh(&self, world: &World<'_>, patches: &Patches) -> crate::ply::Mesh {
+    /// As [`Self::by_object`], with the errors of the means: sampling from the `irradiance` of each
+    /// replicate that this light is the mean of, larger patches from `coarsening`, by replicate and
+    /// patch, and the solver's bound in W/m².
+    ///
+    /// # Panics
+    /// With fewer than two replicates.
+    pub fn by_object_with_errors(
+        &self,
+        world: &World<'_>,
+        patches: &Patches,
+        irradiance: &[Vec<Irradiance>],
+        coarsening: &[Vec<Irradiance>],
+        bound: Rgb,
+    ) -> Vec<ObjectLight> {
+        // Reflected light alone: what is emitted is known.
+        let reflected = |irradiance: Vec<Irradiance>| {
+            let radiosity = irradiance
+                .iter()
+                .zip(patches.reflectances())
+                .map(|(&e, &rho)| rho * e)
+                .collect();
+            let light = Self {
+                irradiance,
+                radiosity,
+            };
+            light.by_object(world, patches)
+        };
+        let values: Vec<_> = irradiance.iter().cloned().map(reflected).collect();
+        let coarsening: Vec<_> = coarsening.iter().cloned().map(reflected).collect();
+        let mut objects = self.by_object(world, patches);
+        let of_object = |from: &[Vec<ObjectLight>], index: usize| {
+            from.iter()
+                .map(|objects| objects[index].radiosity.0)
+                .collect()
+        };
+        let replicates: Vec<Replicates> = (0..objects.len())
+            .map(|index| Replicates {
+                values: of_object(&values, index),
+                coarsening: of_object(&coarsening, index),
+            })
+            .collect();
+        let accuracy = Accuracy::of(&replicates);
+        for (object, error) in objects.iter_mut().zip(accuracy.standard_error()) {
+            let square = error.0 * error.0 + bound * bound;
+            object.standard_error = Some(Radiosity(square.map(f64::sqrt)));
+        }
+        objects
+    }
+
+    /// The patches as a mesh without T-junctions, continuous over smooth surfaces of one material
+    /// ([`Display`]); `errors` are those of the patches' irradiance, and `exposed` tells which patches
+    /// lie in the open. Where smaller patches meet a larger one, that is a fan around its middle.
+    ///
+    /// # Panics
+    /// When there is not one error and one answer per patch.
+    pub fn mesh(
+        &self,
+        world: &World<'_>,
+        patches: &Patches,
+        errors: &[Irradiance],
+        exposed: &[bool],
+    ) -> Mesh {
+        assert_eq!(errors.len(), patches.len(), "one error per patch");
         let geometry = world.surfaces().geometry();
-        let mut mesh = crate::ply::Mesh::default();
+        let material = |patch: PatchId| world.surfaces().material_id(patches.faces(patch).0[0]);
+        let display = Display::new(world, patches, exposed, |a, b| material(a) == material(b));
+        let radiosity: Vec<Rgb> = self.radiosity.iter().map(|b| b.0).collect();
+        let errors: Vec<Rgb> = errors
+            .iter()
+            .zip(patches.reflectances())
+            .map(|(&error, &rho)| (rho * error).0)
+            .collect();
+        let at_vertices = display.at_vertices(&radiosity);
+        let vertex = |position, radiosity, error| Vertex {
+            position: geometry.frame().to_world(position),
+            radiosity: Radiosity(radiosity),
+            standard_error: Radiosity(error),
+        };
+        let mut mesh = Mesh {
+            vertices: display
+                .vertices()
+                .iter()
+                .zip(at_vertices.iter().zip(display.at_vertices(&errors)))
+                .map(|(v, (&radiosity, error))| vertex(v.position, radiosity, error))
+                .collect(),
+            faces: Vec::new(),
+        };
         for patch in patches.ids() {
-            for polygon in patches.polygons(geometry, patch) {
-                let first = mesh.vertices.len() as u32;
-                mesh.faces
-                    .push((first..first + polygon.len() as u32).collect());
+            for piece in display.pieces(patch) {
+                let corners = &piece.vertices;
+                if !piece.has_hanging {
+                    mesh.faces.push(corners.clone());
+                    continue;
+                }
+                let places = corners
+                    .iter()
+                    .map(|&v| display.vertices()[v as usize].position);
+                let middle = places.sum::<DVec3>() / corners.len() as f64;
+                let centre = mesh.vertices.len() as u32;
+                let index = patch.index();
                 mesh.vertices
-                    .extend(polygon.iter().map(|&corner| crate::ply::Vertex {
-                        position: geometry.frame().to_world(corner),
-                        radiosity: self.radiosity[patch.index()],
-                    }));
+                    .push(vertex(middle, radiosity[index], errors[index]));
+                let next = corners.iter().cycle().skip(1);
+                mesh.faces
+                    .extend(corners.iter().zip(next).map(|(&a, &b)| vec![a, b, centre]));
             }
         }
         mesh

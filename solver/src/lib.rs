@@ -28,6 +28,8 @@ pub mod error;
 
 pub mod pilot;
 
+pub mod subdivision;
+
 pub mod gather;
 
 pub mod adaptive;

@@ -92,6 +92,14 @@ impl<'s> World<'s> {
         Patches::mesh_with_density(&self.surfaces, &self.bvh, count, density)
     }
 
+    /// A mesh with the marked patches divided.
+    ///
+    /// # Panics
+    /// As [`Patches::refined`].
+    pub fn refine(&self, patches: &Patches, marked: &[bool]) -> Patches {
+        patches.refined(&self.surfaces, &self.bvh, marked)
+    }
+
     /// What a ray met; `None` for a miss.
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<Interaction> {
         let triangle = hit.triangle()?;

@@ -87,6 +87,8 @@ fn tables() {
 fn solutions_and_form_factors() {
     let cornell = example("cornell");
     deterministic(&["solve", arg(&cornell), "--rays", "16"], "a.ply", true);
+    // Patches and rays chosen from what was sampled.
+    deterministic(&["solve", arg(&cornell), "--error", "6%"], "a.ply", true);
     let raycast = [
         "form-factors",
         arg(&cornell),

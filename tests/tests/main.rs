@@ -15,6 +15,7 @@ mod leaks;
 mod ray_cast;
 mod references;
 mod sampling;
+mod solve_errors;
 mod solvers;
 mod specular;
 mod stress_rays;

@@ -6,7 +6,7 @@ use super::refine::refine;
 use super::scene;
 use super::stated::StatedError;
 use super::steering::Steering;
-use super::transport::{Purpose, Transport};
+use super::transport::Transport;
 use super::{Context, Session};
 use crate::camera::CameraFrame;
 use crate::files::Output;
@@ -225,7 +225,7 @@ impl Render {
             }
             Method::Path => show(&PathTracer::new(world, seed), 0.0),
             Method::Radiosity => {
-                let transport = Transport::solve(world, Purpose::View, context)?;
+                let transport = Transport::view(world, context)?;
                 let view = RadiosityView::new(world, &transport.patches, &transport.solutions);
                 show(&view, 0.0)
             }

@@ -1,30 +1,33 @@
 //! `luxel solve`: radiosity by object, convergence, and where the light goes.
 
+mod budget;
+mod report;
+mod rows;
+
 use super::dense::{self, DenseSolution, Solver};
 use super::exit::{ExitCode, Failure};
 use super::form_factors::Method;
+use super::goal::Goal;
 use super::scene;
-use super::transport::{Purpose, Transport};
 use super::{Context, Session};
+use crate::accuracy::{Accuracy, Part};
 use crate::files::Output;
-use crate::solution::{ObjectLight, PatchLight, emitted_flux};
-use luxel_scenes::{Irradiance, Radiosity, Rgb};
+use crate::solution::{PatchLight, emitted_flux};
+use luxel_scenes::{Irradiance, Rgb};
 use luxel_solver::patches::PatchSize;
 use luxel_solver::radiosity::RadiositySolution;
-use luxel_solver::solvers::{Ledger, Outcome};
+use luxel_solver::solvers::Outcome;
 use luxel_solver::world::World;
-use std::fmt::Write as _;
+use report::{Energy, Report};
+use rows::{Solved, Task};
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Independent solutions, whose scatter is the sampling error.
-const REPLICATES: u32 = 4;
-
-/// Patches of a mesh whose size is not given.
-const PATCHES: usize = 4000;
-
 /// Rays of a patch whose form factors are ray-cast.
 const RAYS: usize = 65_536;
+
+/// Rays of each patch's row when only the patch size is given.
+const ROW_RAYS: usize = 256;
 
 /// Patches of such a mesh when every pair has a form factor.
 const DENSE_PATCHES: usize = 1000;
@@ -32,13 +35,16 @@ const DENSE_PATCHES: usize = 1000;
 /// Solve for the radiosity of a scene
 ///
 /// Prints area-weighted means by object (W/m², or lm/m² in a photometric scene), the energy ledger
-/// (W) and the estimated error. Both sides of a two-sided object count.
+/// (W) and the estimated error in its parts. Both sides of a two-sided object count. Patches and rays
+/// are chosen such that --error is reached, relative root mean square over the patches; with --rays,
+/// --form-factors, or --patch-size without --error and --time, the budget is fixed.
 #[derive(clap::Args)]
 pub(super) struct Solve {
     /// Scene file (.toml), or geometry (.obj, .gltf, .glb)
     scene: PathBuf,
 
-    /// Side of a patch in metres, or `whole` for one patch per face [default: about 4000 patches]
+    /// Side of a patch in metres, or `whole` for one patch per face [default: patches that follow the
+    /// light, as many as the error asks for]
     #[arg(long, value_name = "S|whole", value_parser = parse_patch_size)]
     patch_size: Option<PatchSize>,
 
@@ -51,7 +57,7 @@ pub(super) struct Solve {
     #[arg(long, value_enum, value_name = "NAME", requires = "form_factors")]
     solver: Option<Solver>,
 
-    /// Rays of each patch [default: 256; raycast: 65536]; analytic: points for each pair of polygons
+    /// Rays of each patch [default: as the error asks for; raycast: 65536]; analytic: points for each pair of polygons
     /// that something may occlude [default: 400]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
     rays: Option<u32>,
@@ -69,39 +75,6 @@ pub(super) struct Solve {
     output: Option<PathBuf>,
 }
 
-/// What is reported.
-struct Report {
-    patches: usize,
-    objects: Vec<ObjectLight>,
-    mesh: Option<Vec<u8>>,
-    iterations: usize,
-    residual: Rgb,
-    energy: Energy,
-    error: Error,
-    converged: bool,
-    seconds: Vec<(&'static str, f64)>,
-}
-
-/// Where the flux goes, in W: emitted = absorbed + escaped + residual.
-struct Energy {
-    emitted: Rgb,
-    absorbed: Rgb,
-    escaped: Rgb,
-    residual: Rgb,
-}
-
-/// Estimated relative errors.
-struct Error {
-    /// Bound on what the iteration leaves, over the brightest patch.
-    solver: f64,
-    /// Bound on the root mean square of the same, over the mean radiosity; `None` where form factors
-    /// are not reciprocal.
-    solver_rms: Option<f64>,
-    /// Standard error of the irradiance, root mean square over mean; `None` for hemicubes, whose
-    /// error is a bias.
-    sampling: Option<f64>,
-}
-
 impl Solve {
     pub(super) fn run(self, session: &mut Session<'_>) -> Result<ExitCode, Failure> {
         if self.form_factors.is_some() || self.resolution.is_some() {
@@ -112,11 +85,12 @@ impl Solve {
         let scene = scene::read(&self.scene, &session.context)?;
         let loaded = started.elapsed().as_secs_f64();
         let context = &session.context;
+        let goal = context.common.goal(started);
         let mut report = context.common.install(|| {
             let world = World::new(&scene);
             scene::require_light(&world)?;
             match self.form_factors {
-                None => self.solve_rows(&world, context),
+                None => self.solve_rows(&world, &goal, context),
                 Some(method) => self.solve_dense(&world, method, context),
             }
         })??;
@@ -132,74 +106,92 @@ impl Solve {
                 "the iteration stopped at its limit before the tolerance; the error bound is valid",
             );
         }
-        let sampling = report.error.sampling.map_or(String::new(), |sampling| {
-            format!(
-                ", sampling error {:.2} % of the mean irradiance",
-                100.0 * sampling
-            )
-        });
-        context.reporter.note(format_args!(
-            "{} patches, {} sweeps, {total:.2} s; solver error below {:.1e}{sampling}",
-            report.patches, report.iterations, report.error.solver
-        ));
+        context.reporter.note(report.summary(total));
+        let missed = report.reached() == Some(false);
+        if missed && let Some(target) = report.target {
+            context.reporter.warning(format_args!(
+                "the error of {} % that was asked for was not reached",
+                100.0 * target
+            ));
+        }
         let text = if session.context.common.json {
             serde_json::to_string_pretty(&report.to_json(self.output.as_deref()))?
         } else {
             report.to_table()
         };
         session.print(&text)?;
-        Ok(ExitCode::Ok)
+        Ok(if missed {
+            ExitCode::TargetMissed
+        } else {
+            ExitCode::Ok
+        })
     }
 
     /// Sparse rows in classes, direct light apart.
-    fn solve_rows(&self, world: &World<'_>, context: &Context<'_>) -> Result<Report, Failure> {
+    fn solve_rows(
+        &self,
+        world: &World<'_>,
+        goal: &Goal,
+        context: &Context<'_>,
+    ) -> Result<Report, Failure> {
         let started = Instant::now();
-        let purpose = Purpose::Solve {
-            size: self.patch_size.unwrap_or(PatchSize::Count(PATCHES)),
-            rays: self.rays.unwrap_or(256) as usize,
+        let asked = context.common.error.is_some() || context.common.time.is_some();
+        let fixed = (self.patch_size.is_some() && !asked).then_some(ROW_RAYS);
+        let rays = self.rays.map(|rays| rays as usize).or(fixed);
+        let task = Task {
+            size: self.patch_size,
+            rays,
             tolerance: self.tolerance,
-            replicates: REPLICATES,
+            goal,
         };
-        let Transport { patches, solutions } = Transport::solve(world, purpose, context)?;
-        let solved = started.elapsed().as_secs_f64();
+        let solved = task.run(world, context)?;
+        let solve_seconds = started.elapsed().as_secs_f64();
+        let Solved {
+            patches,
+            solutions,
+            accuracy,
+            errors,
+            irradiance,
+            coarsening,
+        } = &solved;
 
-        let mean = |values: Vec<Irradiance>| {
-            let count = values.len() as f64;
-            values.into_iter().sum::<Irradiance>() * (1.0 / count)
-        };
-        let irradiance = patches
-            .ids()
-            .map(|patch| mean(solutions.iter().map(|s| s.mean_irradiance(patch)).collect()))
-            .collect();
-        let light = PatchLight::new(&patches, irradiance);
-        let each: Vec<Vec<ObjectLight>> = solutions
-            .iter()
-            .map(|solution| {
-                let irradiance = patches.ids().map(|p| solution.mean_irradiance(p)).collect();
-                PatchLight::new(&patches, irradiance).by_object(world, &patches)
-            })
-            .collect();
+        let light = PatchLight::new(patches, accuracy.irradiance.clone());
+        let errors_of_patches: Vec<Irradiance> = accuracy.standard_error().collect();
+        let is_exposed = |patch| solutions.iter().any(|s| s.is_exposed(patch));
+        let exposed: Vec<bool> = patches.ids().map(is_exposed).collect();
+        let mesh = self
+            .output
+            .as_ref()
+            .map(|_| light.mesh(world, patches, &errors_of_patches, &exposed));
         let largest = |value: fn(&RadiositySolution) -> Rgb| {
             solutions.iter().map(value).fold(Rgb::ZERO, Rgb::max)
         };
-        let mesh = self.output.as_ref().map(|_| light.mesh(world, &patches));
+        let bound = largest(|solution| solution.error_bound);
+        let objects = light.by_object_with_errors(world, patches, irradiance, coarsening, bound);
+        let target = match rays {
+            None => goal.error,
+            Some(_) => context.common.error,
+        };
         Ok(Report {
             patches: patches.len(),
-            objects: light.by_object(world, &patches),
+            objects,
             mesh: mesh.map(|mesh| mesh.to_ply()).transpose()?,
             iterations: solutions.iter().map(|s| s.iterations).max().unwrap_or(0),
             residual: largest(|solution| solution.residual),
             energy: Energy::new(
-                &solutions,
-                (world.scene().lights.is_empty()).then(|| emitted_flux(world, &patches).0),
+                solutions,
+                (world.scene().lights.is_empty()).then(|| emitted_flux(world, patches).0),
             ),
-            error: Error {
-                solver: largest(|solution| solution.error_bound).max_element() / light.brightest(),
-                solver_rms: None,
-                sampling: Some(sampling_error(&each)),
-            },
+            errors: *errors,
+            target: target.map(|error| error.0),
+            solver_rms: None,
             converged: solutions.iter().all(|s| s.outcome == Outcome::Converged),
-            seconds: vec![("solve", solved)],
+            seconds: vec![("solve", solve_seconds)],
+            remedy: match (rays, errors.dominant()) {
+                (None, _) => "a smaller --error",
+                (Some(_), Part::Discretisation) => "a smaller --patch-size",
+                (Some(_), _) => "more --rays",
+            },
         })
     }
 }
@@ -227,29 +219,67 @@ impl Solve {
             mean_error_bound,
             standard_error,
         } = solved;
-        let light = PatchLight::new(&patches, solution.irradiance);
-        let mesh = self.output.as_ref().map(|_| light.mesh(world, &patches));
-        let squares: f64 = patches
-            .areas()
-            .iter()
-            .zip(&standard_error)
-            .map(|(area, error)| area * error.0.length_squared() / 3.0)
-            .sum();
-        let level: f64 = patches
-            .areas()
-            .iter()
-            .zip(&light.irradiance)
-            .map(|(area, irradiance)| area * irradiance.0.element_sum() / 3.0)
-            .sum();
+        // Noise of the rows is amplified by the light that goes on from patch to patch.
         let area: f64 = patches.areas().iter().sum();
-        let sampling = (squares / area).sqrt() / (level / area);
-        let leaving: f64 = (patches.areas().iter().zip(&light.radiosity))
-            .map(|(area, radiosity)| area * radiosity.0.element_sum() / 3.0)
+        let reflected: f64 = patches
+            .areas()
+            .iter()
+            .zip(patches.reflectances())
+            .map(|(area, rho)| area * rho.0.max_element())
             .sum();
-        let solver_rms = mean_error_bound.map(|bound| bound.max_element() / (leaving / area));
+        let amplification = 1.0 / (1.0 - reflected / area);
+        let sampling: Vec<Rgb> = standard_error
+            .iter()
+            .map(|e| e.0 * e.0 * (amplification * amplification))
+            .collect();
+        let coarsening = rows::against_children(world, &patches, self.tolerance, context)?;
+        let replicates = vec![solution.irradiance.clone(); coarsening.len()];
+        let accuracy = Accuracy::of_patches(&replicates, &coarsening);
+        let accuracy = Accuracy {
+            sampling,
+            ..accuracy
+        };
+        let mut errors = accuracy.relative(patches.areas(), solution.error_bound);
+        if method == Method::Hemicube {
+            errors.sampling = None;
+        }
+        let light = PatchLight::new(&patches, solution.irradiance);
+        let of_patches: Vec<Irradiance> = accuracy.standard_error().collect();
+        let everywhere = vec![true; patches.len()];
+        let mesh = self
+            .output
+            .as_ref()
+            .map(|_| light.mesh(world, &patches, &of_patches, &everywhere));
+        let bound = solution.error_bound;
+        let mut objects =
+            light.by_object_with_errors(world, &patches, &replicates, &coarsening, bound);
+        // Rows are independent, so that the mean over an object has less noise than its patches: at
+        // most the root mean square of all, which is what is stated.
+        let noise = accuracy
+            .sampling
+            .iter()
+            .zip(patches.reflectances())
+            .zip(patches.areas())
+            .map(|((square, rho), share)| *square * rho.0 * rho.0 * (share / area))
+            .sum::<Rgb>();
+        for error in objects
+            .iter_mut()
+            .filter_map(|object| object.standard_error.as_mut())
+        {
+            error.0 = (error.0 * error.0 + noise).map(f64::sqrt);
+        }
+        let brightness: Rgb = patches
+            .areas()
+            .iter()
+            .zip(&light.radiosity)
+            .map(|(share, radiosity)| radiosity.0 * (share / area))
+            .sum();
+        let solver_rms = mean_error_bound
+            .filter(|_| brightness.max_element() > 0.0)
+            .map(|bound| bound.max_element() / brightness.max_element());
         Ok(Report {
             patches: patches.len(),
-            objects: light.by_object(world, &patches),
+            objects,
             mesh: mesh.map(|mesh| mesh.to_ply()).transpose()?,
             iterations: solution.iterations,
             residual: solution.residual,
@@ -259,130 +289,17 @@ impl Solve {
                 escaped: ledger.escaped.0,
                 residual: ledger.residual.0 + ledger.defect.0,
             },
-            error: Error {
-                solver: solution.error_bound.max_element() / light.brightest(),
-                solver_rms,
-                sampling: (method != Method::Hemicube && level > 0.0).then_some(sampling),
+            solver_rms,
+            errors,
+            target: context.common.error.map(|error| error.0),
+            remedy: match (errors.dominant(), method) {
+                (Part::Discretisation, _) => "a smaller --patch-size",
+                (_, Method::Hemicube) => "a larger --resolution",
+                _ => "more --rays",
             },
             converged: solution.outcome == Outcome::Converged,
             seconds: vec![("solve", seconds)],
         })
-    }
-}
-
-impl Energy {
-    /// The mean ledger of the solutions. `emitted` is the flux of all surfaces when these are the
-    /// only lights: what of it meets no surface has escaped. Of other lights, only what arrives is
-    /// known to be theirs, so that it counts as emitted.
-    fn new(solutions: &[RadiositySolution], emitted: Option<Rgb>) -> Self {
-        let mean = |value: fn(&Ledger) -> Rgb| {
-            let sum: Rgb = solutions.iter().map(|s| value(&s.ledger)).sum();
-            sum / solutions.len() as f64
-        };
-        let arrived = mean(|ledger| ledger.emitted.0 + ledger.direct.0);
-        let emitted = emitted.unwrap_or(arrived);
-        Self {
-            emitted,
-            absorbed: mean(|ledger| ledger.absorbed.0),
-            escaped: mean(|ledger| ledger.escaped.0) + (emitted - arrived),
-            residual: mean(|ledger| ledger.residual.0 + ledger.defect.0),
-        }
-    }
-}
-
-/// Root mean square over objects of the standard error of the mean irradiance, over the mean.
-fn sampling_error(replicates: &[Vec<ObjectLight>]) -> f64 {
-    let objects = replicates.first().map_or(0, Vec::len);
-    let (mut squares, mut level, mut area) = (0.0, 0.0, 0.0);
-    for object in 0..objects {
-        let mut moments = crate::film::Moments::default();
-        for replicate in replicates {
-            moments.add(replicate[object].irradiance.0);
-        }
-        let own = replicates[0][object].area;
-        let error = moments.standard_error().unwrap_or_default();
-        squares += own * error.length_squared() / 3.0;
-        level += own * moments.mean().element_sum() / 3.0;
-        area += own;
-    }
-    if level > 0.0 {
-        (squares / area).sqrt() / (level / area)
-    } else {
-        0.0
-    }
-}
-
-impl Report {
-    fn to_json(&self, output: Option<&std::path::Path>) -> serde_json::Value {
-        let objects: serde_json::Map<_, _> = self
-            .objects
-            .iter()
-            .map(|object| {
-                let Radiosity(radiosity) = object.radiosity;
-                let value = serde_json::json!({
-                    "area": object.area,
-                    "radiosity": radiosity.to_array(),
-                    "irradiance": object.irradiance.0.to_array(),
-                });
-                (object.name.clone(), value)
-            })
-            .collect();
-        let seconds: serde_json::Map<_, _> = self
-            .seconds
-            .iter()
-            .map(|&(stage, seconds)| (stage.to_owned(), seconds.into()))
-            .collect();
-        serde_json::json!({
-            "patches": self.patches,
-            "objects": objects,
-            "iterations": self.iterations,
-            "residual": self.residual.to_array(),
-            "energy": {
-                "emitted": self.energy.emitted.to_array(),
-                "absorbed": self.energy.absorbed.to_array(),
-                "escaped": self.energy.escaped.to_array(),
-                "residual": self.energy.residual.to_array(),
-            },
-            "error": {
-                "solver": self.error.solver,
-                "solver_rms": self.error.solver_rms,
-                "sampling": self.error.sampling,
-            },
-            "output": output.map(|path| path.display().to_string()),
-            "seconds": seconds,
-        })
-    }
-
-    fn to_table(&self) -> String {
-        let rgb = |value: Rgb| format!("{:>11.4e} {:>11.4e} {:>11.4e}", value.x, value.y, value.z);
-        let width = self.objects.iter().map(|o| o.name.chars().count()).max();
-        let width = width.unwrap_or(0).max(9);
-        // Writing to a string does not fail.
-        let mut text = format!(
-            "{:width$} {:>10}  {:>35}  {:>35}\n",
-            "object", "area m2", "radiosity W/m2", "irradiance W/m2"
-        );
-        for object in &self.objects {
-            let _ = writeln!(
-                text,
-                "{:width$} {:>10.4}  {}  {}",
-                object.name,
-                object.area,
-                rgb(object.radiosity.0),
-                rgb(object.irradiance.0)
-            );
-        }
-        let lines = [
-            ("emitted", self.energy.emitted),
-            ("absorbed", self.energy.absorbed),
-            ("escaped", self.energy.escaped),
-            ("residual", self.energy.residual),
-        ];
-        for (index, (name, flux)) in lines.into_iter().enumerate() {
-            let line = if index == 0 { "\n" } else { "" };
-            let _ = writeln!(text, "{line}{name:width$} {:>10}  {}", "W", rgb(flux));
-        }
-        text.trim_end().to_owned()
     }
 }
 

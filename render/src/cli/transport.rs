@@ -1,4 +1,4 @@
-//! The radiosity solutions that are shown or reported themselves, with their defaults.
+//! The radiosity solution that is shown itself, with its defaults.
 
 use super::Context;
 use super::exit::Failure;
@@ -30,67 +30,32 @@ pub(super) struct Transport {
     pub(super) solutions: Vec<RadiositySolution>,
 }
 
-/// What solutions are for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Purpose {
-    /// To be shown.
-    View,
-    /// To be reported.
-    Solve {
-        /// How finely to mesh.
-        size: PatchSize,
-        /// Rays of each row.
-        rays: usize,
-        /// Bound on the error that the iteration may leave, relative to the brightest patch.
-        tolerance: f64,
-        /// Independent solutions.
-        replicates: u32,
-    },
-}
-
 impl Transport {
-    /// Meshes and solves.
-    pub(super) fn solve(
-        world: &World<'_>,
-        purpose: Purpose,
-        context: &Context<'_>,
-    ) -> Result<Self, Failure> {
-        let (size, rays, tolerance, replicates) = match purpose {
-            Purpose::View => (PatchSize::Count(VIEW_PATCHES), VIEW_ROW_RAYS, TOLERANCE, 1),
-            Purpose::Solve {
-                size,
-                rays,
-                tolerance,
-                replicates,
-            } => (size, rays, tolerance, replicates),
-        };
+    /// Meshes and solves for a picture of the solution.
+    pub(super) fn view(world: &World<'_>, context: &Context<'_>) -> Result<Self, Failure> {
         let reporter = &context.reporter;
-        let patches = world.mesh(size)?;
-        reporter.start("solving radiosity", u64::from(replicates));
-        let mut solutions = Vec::new();
-        for replicate in 0..replicates {
-            let config = RadiosityConfig {
-                rays,
-                shadow_rays: SHADOW_RAYS,
-                solver: Config {
-                    tolerance: Tolerance::Error(tolerance),
-                    max_iterations: MAX_ITERATIONS,
-                },
-                seed: context.common.seed,
-                replicate: u64::from(replicate),
-            };
-            solutions.push(solve(world, &patches, &config)?);
-            reporter.advance(1);
-        }
+        let patches = world.mesh(PatchSize::Count(VIEW_PATCHES))?;
+        reporter.start("solving radiosity", 1);
+        let config = RadiosityConfig {
+            rays: VIEW_ROW_RAYS,
+            shadow_rays: SHADOW_RAYS,
+            solver: Config {
+                tolerance: Tolerance::Error(TOLERANCE),
+                max_iterations: MAX_ITERATIONS,
+            },
+            seed: context.common.seed,
+            replicate: 0,
+        };
+        let solution = solve(world, &patches, &config)?;
         reporter.finish();
-        if let Some(solution) = solutions.first() {
-            reporter.detail(format_args!(
-                "{} patches, {} rays a row, {} sweeps, {replicates} solutions",
-                patches.len(),
-                rays,
-                solution.iterations
-            ));
-        }
-        Ok(Self { patches, solutions })
+        reporter.detail(format_args!(
+            "{} patches, {VIEW_ROW_RAYS} rays a row, {} sweeps",
+            patches.len(),
+            solution.iterations
+        ));
+        Ok(Self {
+            patches,
+            solutions: vec![solution],
+        })
     }
 }

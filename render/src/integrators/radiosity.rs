@@ -1,14 +1,14 @@
 //! The radiosity solution itself, as a picture.
 //!
 //! L = L_e + ρE/π, where E is the irradiance of the patches, interpolated over smooth surfaces but
-//! not across creases (`super::smooth`); emission and reflectance are those of the very point, so
+//! not across creases ([`crate::display`]); emission and reflectance are those of the very point, so
 //! that textures stay sharp. Biased by the size of the patches: shadows are as soft as patches are
 //! large. Cost: one ray a camera sample.
 
-use super::smooth::SmoothField;
 use super::vertex::Vertex;
 use super::{Integrator, SampleKey, Seen, background, cast};
 use crate::camera::CameraRay;
+use crate::display::Display;
 use luxel_scenes::{Irradiance, Rgb};
 use luxel_solver::patches::Patches;
 use luxel_solver::radiosity::RadiositySolution;
@@ -18,7 +18,11 @@ use luxel_solver::world::World;
 pub struct RadiosityView<'w> {
     world: &'w World<'w>,
     patches: &'w Patches,
-    field: SmoothField,
+    display: Display,
+    /// Irradiance at the display's vertices.
+    at_vertices: Vec<Rgb>,
+    /// Irradiance of the patches.
+    of_patches: Vec<Rgb>,
 }
 
 impl<'w> RadiosityView<'w> {
@@ -39,12 +43,16 @@ impl<'w> RadiosityView<'w> {
                 .map(|solution| solution.mean_irradiance(patch));
             values.sum::<Irradiance>() * share
         };
-        let values = patches.ids().map(mean).collect();
-        let geometry = world.surfaces().geometry();
+        let of_patches: Vec<Rgb> = patches.ids().map(|patch| mean(patch).0).collect();
+        let is_exposed = |patch| solutions.iter().any(|solution| solution.is_exposed(patch));
+        let exposed: Vec<bool> = patches.ids().map(is_exposed).collect();
+        let display = Display::new(world, patches, &exposed, |_, _| true);
         Self {
             world,
             patches,
-            field: SmoothField::new(geometry, patches, values),
+            at_vertices: display.at_vertices(&of_patches),
+            display,
+            of_patches,
         }
     }
 
@@ -56,7 +64,11 @@ impl<'w> RadiosityView<'w> {
             .patches
             .at(geometry, point.triangle, point.u, point.v, interaction.side);
         let irradiance = patch.map_or(Irradiance::ZERO, |patch| {
-            self.field.at(patch, point, interaction.receiver.position)
+            let position = interaction.receiver.position;
+            let smooth = self
+                .display
+                .interpolate(&self.at_vertices, patch, point, position);
+            Irradiance(smooth.unwrap_or(self.of_patches[patch.index()]))
         });
         (vertex.reflectance() * irradiance).to_radiance().0
     }

@@ -6,10 +6,12 @@
 //! |---|---|---|
 //! | solver | what the iteration leaves | a rigorous bound from the residual ([`crate::solvers`]) |
 //! | sampling | noise of rows, of shadow rays and of the gather | the scatter of independent randomisations, [moderated](moderate) |
-//! | discretisation | patches of finite size | two meshes looked up at the same hits ([`crate::gather`]) |
+//! | discretisation | patches of finite size | two meshes looked up at the same hits ([`crate::gather`], [`fn@coarsening`]) |
 
+mod coarsening;
 mod discretisation;
 mod moderate;
 
+pub use coarsening::{coarsening, parents};
 pub use discretisation::discretisation;
 pub use moderate::moderate;

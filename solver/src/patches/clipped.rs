@@ -91,6 +91,11 @@ impl Clipped {
         }
     }
 
+    /// Side of a cell.
+    pub(super) fn cell(&self) -> f64 {
+        self.cell
+    }
+
     /// The element at a point of the polygon's plane.
     pub(super) fn element_at(&self, p: DVec3) -> u32 {
         let index = |axis: usize| {

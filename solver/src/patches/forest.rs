@@ -6,6 +6,8 @@
 //! R. A. Finkel, J. L. Bentley, "Quad Trees: A Data Structure for Retrieval on Composite Keys",
 //! Acta Informatica 4, 1974. Cost of a lookup: one step a level.
 
+use std::collections::HashSet;
+
 /// Levels below a root that a leaf can lie on: a path holds two bits for each.
 pub(super) const MAX_LEVEL: u8 = 16;
 
@@ -39,6 +41,15 @@ impl Node {
             level: self.level + 1,
             path: self.path << 2 | quadrant,
         }
+    }
+
+    /// The node above; `None` for a root.
+    fn parent(self) -> Option<Self> {
+        (self.level > 0).then(|| Self {
+            root: self.root,
+            level: self.level - 1,
+            path: self.path >> 2,
+        })
     }
 
     /// The quadrants on the way from the root.
@@ -94,6 +105,31 @@ impl Forest {
             return Self::uniform(roots);
         }
         forest
+    }
+
+    /// The forest with the leaves divided for which `marked` is true, and as many more as it takes
+    /// for leaves that share an edge to differ by one level at most (a restricted quadtree, B. Von
+    /// Herzen, A. H. Barr, "Accurate Triangulations of Deformed, Intersecting Surfaces", SIGGRAPH
+    /// 1987). `neighbours` are the nodes of the same level across the edges.
+    pub(super) fn refined<I: IntoIterator<Item = Node>>(
+        &self,
+        marked: impl Fn(u32) -> bool,
+        neighbours: impl Fn(Node) -> I,
+    ) -> Self {
+        let mut divided = HashSet::new();
+        let mut pending: Vec<Node> = (0..self.len())
+            .filter(|&element| marked(element))
+            .map(|element| self.leaf(element))
+            .collect();
+        pending.extend((0..self.len()).filter_map(|element| self.leaf(element).parent()));
+        while let Some(node) = pending.pop() {
+            if node.level < MAX_LEVEL && divided.insert(node) {
+                pending.extend(node.parent());
+                // What lies beside its children must be a node, too.
+                pending.extend(neighbours(node).into_iter().filter_map(Node::parent));
+            }
+        }
+        Self::grow(self.roots, |node| divided.contains(&node))
     }
 
     /// Number of elements.

@@ -13,6 +13,7 @@ use crate::geometry::Geometry;
 use crate::surface::Surfaces;
 use glam::DVec3;
 use luxel_scenes::{Exitance, FaceId, Reflectance, Sidedness};
+use std::collections::HashSet;
 use thiserror::Error;
 
 /// How finely to mesh.
@@ -99,6 +100,63 @@ impl Patches {
     }
 }
 
+impl Patches {
+    /// The mesh with the marked patches divided: elements of grids in four (and neighbours with them,
+    /// so that elements that share an edge differ by one level at most), clusters into smaller ones,
+    /// and polygons of five and more corners as a whole where half of their area is marked. A patch
+    /// of one side is divided when its other side is.
+    ///
+    /// # Panics
+    /// When there is not one mark per patch.
+    #[must_use]
+    pub fn refined(&self, surfaces: &Surfaces, bvh: &Bvh, marked: &[bool]) -> Self {
+        assert_eq!(marked.len(), self.len(), "one mark for each patch");
+        let geometry = surfaces.geometry();
+        let mesher = Mesher::new(surfaces, bvh, None);
+        let mut regions = Vec::new();
+        for old in &self.regions {
+            let is_marked = |element: u32| {
+                marked[(old.first + element) as usize]
+                    || old
+                        .first_back
+                        .is_some_and(|first| marked[(first + element) as usize])
+            };
+            let count = old.element_count();
+            if !(0..count).any(is_marked) {
+                regions.push(old.clone());
+                continue;
+            }
+            let shape = match &old.shape {
+                Shape::Quad(quad) => Shape::Quad(quad.refined(is_marked)),
+                Shape::Triangle(triangle) => Shape::Triangle(triangle.refined(is_marked)),
+                Shape::Clipped(clipped) => {
+                    let area = |wanted: bool| -> f64 {
+                        (0..count)
+                            .filter(|&element| is_marked(element) || !wanted)
+                            .map(|element| old.element_area(geometry, element))
+                            .sum()
+                    };
+                    if area(true) < 0.5 * area(false) {
+                        old.shape.clone()
+                    } else {
+                        let polygon = geometry.polygon(old.faces[0]);
+                        polygon_shape(&polygon, 0.5 * clipped.cell())
+                    }
+                }
+                Shape::Faces { .. } => {
+                    let size = 0.5 * old.element_area(geometry, 0).sqrt();
+                    let mut faces = old.faces.clone();
+                    faces.sort_unstable_by_key(|face| face.index());
+                    regions.extend(mesher.divide_faces(&faces, &old.faces, size));
+                    continue;
+                }
+            };
+            regions.push(region(shape, old.faces.clone()));
+        }
+        assemble(surfaces, regions, false)
+    }
+}
+
 /// One region for each object with faces.
 fn objects(surfaces: &Surfaces, areas: &[f64]) -> Vec<Region> {
     let scene = surfaces.scene();
@@ -171,23 +229,35 @@ impl<'m, 's> Mesher<'m, 's> {
                 limit: MAX_PATCHES,
             });
         }
+        let faces: Vec<FaceId> = (0..self.areas.len()).map(FaceId::new).collect();
+        let mut seen = vec![false; self.areas.len()];
+        let ordered: Vec<FaceId> = self
+            .bvh
+            .leaf_order()
+            .iter()
+            .map(|&triangle| geometry.face(triangle))
+            .filter(|face| !std::mem::replace(&mut seen[face.index()], true))
+            .collect();
+        Ok(self.divide_faces(&faces, &ordered, size))
+    }
+
+    /// Cuts some faces into regions; `ordered` are the same faces as neighbours in space.
+    fn divide_faces(&self, faces: &[FaceId], ordered: &[FaceId], size: f64) -> Vec<Region> {
+        let geometry = self.surfaces.geometry();
         let is_large = |face: FaceId| {
             self.areas[face.index()] * self.face_density(face) >= LARGE_FACE * size * size
         };
-        let large: Vec<FaceId> = (0..self.areas.len())
-            .map(FaceId::new)
-            .filter(|&f| is_large(f))
-            .collect();
+        let large: Vec<FaceId> = faces.iter().copied().filter(|&f| is_large(f)).collect();
         let mut regions = Vec::new();
-        let mut joined = vec![false; self.areas.len()];
+        let mut joined = HashSet::new();
         for quad in quads::join(geometry, &large, |face| self.surfaces.material_id(face)) {
             for face in quad.faces {
-                joined[face.index()] = true;
+                joined.insert(face);
             }
             let shape = self.quad_shape(quad.corners, &quad.faces, size);
             regions.push(region(shape, quad.faces.to_vec()));
         }
-        for &face in large.iter().filter(|face| !joined[face.index()]) {
+        for &face in large.iter().filter(|face| !joined.contains(*face)) {
             let polygon = geometry.polygon(face);
             let shape = if let Ok(corners) = <[DVec3; 4]>::try_from(polygon.as_slice())
                 && quads::is_convex(corners, geometry.normal(face))
@@ -200,13 +270,7 @@ impl<'m, 's> Mesher<'m, 's> {
             };
             regions.push(region(shape, vec![face]));
         }
-        let mut seen = vec![false; self.areas.len()];
-        let small = self
-            .bvh
-            .leaf_order()
-            .iter()
-            .map(|&triangle| geometry.face(triangle))
-            .filter(|face| !is_large(*face) && !std::mem::replace(&mut seen[face.index()], true));
+        let small = ordered.iter().copied().filter(|&face| !is_large(face));
         let clusters = cluster(
             geometry,
             small,
@@ -219,7 +283,7 @@ impl<'m, 's> Mesher<'m, 's> {
                 .into_iter()
                 .map(|members| single(members, &self.areas)),
         );
-        Ok(regions)
+        regions
     }
 
     fn quad_shape(&self, corners: [DVec3; 4], faces: &[FaceId], size: f64) -> Shape {

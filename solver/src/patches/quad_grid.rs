@@ -38,6 +38,32 @@ impl QuadGrid {
         }
     }
 
+    /// The grid with the marked elements divided, balanced.
+    pub(super) fn refined(&self, marked: impl Fn(u32) -> bool) -> Self {
+        Self {
+            forest: self.forest.refined(marked, |node| self.neighbours(node)),
+            ..self.clone()
+        }
+    }
+
+    /// The nodes of the same level across the edges of a node.
+    fn neighbours(&self, node: Node) -> Vec<Node> {
+        let [i, j] = self.index(node);
+        let counts = self.counts.map(|count| i64::from(count) << node.level);
+        [(i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)]
+            .into_iter()
+            .filter(|&(i, j)| (0..counts[0]).contains(&i) && (0..counts[1]).contains(&j))
+            .map(|(i, j)| {
+                let root = (j >> node.level) as u32 * self.counts[0] + (i >> node.level) as u32;
+                (0..node.level)
+                    .rev()
+                    .fold(Node::of_root(root), |node, level| {
+                        node.child((i >> level & 1) as u32 + 2 * (j >> level & 1) as u32)
+                    })
+            })
+            .collect()
+    }
+
     pub(super) fn forest(&self) -> &Forest {
         &self.forest
     }
@@ -88,17 +114,23 @@ impl QuadGrid {
         })
     }
 
+    /// Column and row of a node among those of its level.
+    fn index(&self, node: Node) -> [i64; 2] {
+        let nu = self.counts[0];
+        let mut index = [node.root % nu, node.root / nu].map(i64::from);
+        for quadrant in node.quadrants() {
+            index = [
+                2 * index[0] + i64::from(quadrant & 1),
+                2 * index[1] + i64::from(quadrant >> 1),
+            ];
+        }
+        index
+    }
+
     /// The rectangle of parameters of a node: lower s and t, and its extent in both. The same edge
     /// gives the same bits on both of its sides and on every level.
     fn rectangle(&self, node: Node) -> [[f64; 2]; 2] {
-        let nu = self.counts[0];
-        let mut index = [node.root % nu, node.root / nu].map(u64::from);
-        for quadrant in node.quadrants() {
-            index = [
-                2 * index[0] + u64::from(quadrant & 1),
-                2 * index[1] + u64::from(quadrant >> 1),
-            ];
-        }
+        let index = self.index(node);
         [0, 1].map(|axis| {
             let count = (u64::from(self.counts[axis]) << node.level) as f64;
             [index[axis], index[axis] + 1].map(|line| line as f64 / count)

@@ -7,7 +7,7 @@
 use crate::geometry::Geometry;
 use glam::DVec3;
 use luxel_scenes::{FaceId, MaterialId};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// How far normals may differ (sine) for two triangles to be one plane: the rounding of f32
 /// coordinates in a file, over an edge a thousandth of the scene.
@@ -49,10 +49,10 @@ pub(super) fn join(
             owner.insert(edge_key(c[k], c[(k + 1) % 3]), face);
         }
     }
-    let mut joined = vec![false; geometry.face_count()];
+    let mut joined = HashSet::new();
     let mut quads = Vec::new();
     for &face in faces.iter().filter(|&&face| is_triangle(face)) {
-        if joined[face.index()] {
+        if joined.contains(&face) {
             continue;
         }
         let c = corners(face);
@@ -67,7 +67,7 @@ pub(super) fn join(
                 < COPLANAR
                 && geometry.normal(face).dot(geometry.normal(other)) > 0.0;
             if other == face
-                || joined[other.index()]
+                || joined.contains(&other)
                 || !same_plane
                 || material_of(face) != material_of(other)
             {
@@ -86,8 +86,7 @@ pub(super) fn join(
             }
         }
         if let Some((_, other, corners)) = best {
-            joined[face.index()] = true;
-            joined[other.index()] = true;
+            joined.extend([face, other]);
             quads.push(JoinedQuad {
                 faces: [face, other],
                 corners,

@@ -294,3 +294,53 @@ fn patches_are_as_dense_as_was_asked_for() {
     // between them.
     assert!((4.5..18.0).contains(&(far / near)), "{}", far / near);
 }
+
+#[test]
+fn refined_meshes_keep_the_laws_and_are_balanced() {
+    let scene = scene_of(&mixed(), Sidedness::Both);
+    let world = World::new(&scene);
+    let geometry = world.surfaces().geometry();
+    let mut patches = world.mesh(PatchSize::Length(0.3)).expect("meshes");
+    let target = geometry.frame().to_unit(DVec3::new(0.5, 0.45, 0.0));
+    for round in 0..4 {
+        let marked: Vec<bool> = patches
+            .ids()
+            .map(|patch| {
+                let centre = patches.sample(geometry, patch, [0.5, 0.5]).position;
+                let chance = hash::uniform(5, Stage::PATCHES, u64::from(patch.0), round);
+                centre.distance(target) < f64::from(patches.size(patch)) || chance < 0.05
+            })
+            .collect();
+        let refined = world.refine(&patches, &marked);
+        assert!(refined.len() > patches.len());
+        patches = refined;
+        check_laws(&world, &patches, 2.0);
+    }
+    // Across an edge of an element lie at most two of its neighbours' edges: no corner of another
+    // element of the region lies at a quarter of it.
+    for polygon in &mixed()[..2] {
+        let on_face: Vec<Vec<DVec3>> = patches
+            .ids()
+            .filter(|&patch| {
+                let (faces, side) = patches.faces(patch);
+                let corner = geometry.frame().to_unit(polygon[0]);
+                side == Side::Front && geometry.polygon(faces[0])[0].distance(corner) < 1e-12
+            })
+            .flat_map(|patch| patches.polygons(geometry, patch))
+            .collect();
+        assert!(on_face.len() > 10);
+        for element in &on_face {
+            for k in 0..element.len() {
+                let (a, b) = (element[k], element[(k + 1) % element.len()]);
+                for share in [0.25, 0.75] {
+                    let quarter = a.lerp(b, share);
+                    let touches = on_face
+                        .iter()
+                        .flatten()
+                        .any(|corner| corner.distance(quarter) < 1e-9 * a.distance(b));
+                    assert!(!touches, "{quarter}");
+                }
+            }
+        }
+    }
+}

@@ -18,6 +18,27 @@ pub(super) struct TriangleGrid {
 /// Weights of the second and third corner, in units of a cell of some level.
 type Lattice = [u64; 2];
 
+/// Weights of a node's own second and third corner.
+struct Local(f64, f64);
+
+impl Local {
+    /// Goes to the child that holds the point and tells which it is.
+    fn step(&mut self) -> u32 {
+        let (x, y) = (2.0 * self.0, 2.0 * self.1);
+        let (quadrant, local) = if x >= 1.0 {
+            (1, Self(x - 1.0, y))
+        } else if y >= 1.0 {
+            (2, Self(x, y - 1.0))
+        } else if x + y <= 1.0 {
+            (0, Self(x, y))
+        } else {
+            (3, Self(1.0 - x, 1.0 - y))
+        };
+        *self = local;
+        quadrant
+    }
+}
+
 impl TriangleGrid {
     /// A grid of cells of area about `size`².
     pub(super) fn new(corners: [DVec3; 3], area: f64, size: f64) -> Self {
@@ -37,6 +58,30 @@ impl TriangleGrid {
         }
     }
 
+    /// The grid with the marked elements divided, balanced.
+    pub(super) fn refined(&self, marked: impl Fn(u32) -> bool) -> Self {
+        Self {
+            forest: self.forest.refined(marked, |node| self.neighbours(node)),
+            ..self.clone()
+        }
+    }
+
+    /// The nodes of the same level across the edges of a node: those that hold its mirror images.
+    fn neighbours(&self, node: Node) -> Vec<Node> {
+        let [a, b, c] = self.lattice(node).map(|corner| corner.map(|x| x as f64));
+        let cells = f64::from(1 << node.level);
+        let side = f64::from(self.side);
+        [[a, b, c], [b, c, a], [c, a, b]]
+            .into_iter()
+            .map(|[a, b, c]| [0, 1].map(|k| (2.0 * b[k] + 2.0 * c[k] - a[k]) / (3.0 * cells)))
+            .filter(|[x, y]| *x > 0.0 && *y > 0.0 && x + y < side)
+            .map(|[x, y]| {
+                let (root, mut local) = self.root_at(x, y);
+                (0..node.level).fold(Node::of_root(root), |node, _| node.child(local.step()))
+            })
+            .collect()
+    }
+
     pub(super) fn forest(&self) -> &Forest {
         &self.forest
     }
@@ -49,35 +94,28 @@ impl TriangleGrid {
 
     pub(super) fn element_at(&self, p: DVec3) -> u32 {
         let [a, b, c] = self.corners;
-        let side = self.side;
         let normal = (b - a).cross(c - a);
-        let scale = f64::from(side) / normal.length_squared();
-        let mut x = ((p - a).cross(c - a).dot(normal) * scale).max(0.0);
-        let mut y = ((b - a).cross(p - a).dot(normal) * scale).max(0.0);
+        let scale = f64::from(self.side) / normal.length_squared();
+        let x = ((p - a).cross(c - a).dot(normal) * scale).max(0.0);
+        let y = ((b - a).cross(p - a).dot(normal) * scale).max(0.0);
+        let (root, mut local) = self.root_at(x, y);
+        self.forest.find(root, || local.step())
+    }
+
+    /// The root at weights in units of a cell, and where in it.
+    fn root_at(&self, x: f64, y: f64) -> (u32, Local) {
+        let side = self.side;
         let row = (y as u32).min(side - 1);
         let column = (x as u32).min(side - 1 - row);
-        x -= f64::from(column);
-        y -= f64::from(row);
+        let (x, y) = (x - f64::from(column), y - f64::from(row));
         let upper = x + y > 1.0 && column + row + 1 < side;
         let root = row * (2 * side - row) + 2 * column + u32::from(upper);
-        if upper {
-            (x, y) = (1.0 - x, 1.0 - y);
-        }
-        self.forest.find(root, || {
-            (x, y) = (2.0 * x, 2.0 * y);
-            if x >= 1.0 {
-                x -= 1.0;
-                1
-            } else if y >= 1.0 {
-                y -= 1.0;
-                2
-            } else if x + y <= 1.0 {
-                0
-            } else {
-                (x, y) = (1.0 - x, 1.0 - y);
-                3
-            }
-        })
+        let local = if upper {
+            Local(1.0 - x, 1.0 - y)
+        } else {
+            Local(x, y)
+        };
+        (root, local)
     }
 
     /// The corners of a node on the lattice of its level.

@@ -7,6 +7,7 @@
 mod rows;
 
 use crate::direct::Lights;
+use crate::error;
 use crate::patches::{PatchId, Patches};
 use crate::solvers::{self, Config, Ledger, Outcome, System, SystemError};
 use crate::world::World;
@@ -77,6 +78,7 @@ pub struct RadiosityConfig {
 pub struct RadiositySolution {
     irradiance: Vec<Irradiance>,
     rays: Vec<u32>,
+    coarsening: Vec<Irradiance>,
     /// How the iteration ended.
     pub outcome: Outcome,
     /// Sweeps of the solver.
@@ -109,6 +111,21 @@ impl RadiositySolution {
             .map(|&u| self.irradiance[u] * (f64::from(self.rays[u]) / total))
             .sum()
     }
+
+    /// How much more mean irradiance in W/m² a patch has than with patches as large as the parents
+    /// that [`solve_against`] was given; zero after [`solve`]. Holds noise that is independent between
+    /// replicates.
+    pub fn coarsening(&self, patch: PatchId) -> Irradiance {
+        let value = self.coarsening.get(patch.index());
+        value.copied().unwrap_or(Irradiance::ZERO)
+    }
+
+    /// True when some sample point of the patch lies in the open and not inside a solid.
+    pub fn is_exposed(&self, patch: PatchId) -> bool {
+        Class::all()
+            .iter()
+            .any(|&class| self.rays[unknown(patch, class)] > 0)
+    }
 }
 
 /// Casts rows from every patch and solves for the light that the patches receive.
@@ -121,6 +138,31 @@ impl RadiositySolution {
 pub fn solve(
     world: &World,
     patches: &Patches,
+    config: &RadiosityConfig,
+) -> Result<RadiositySolution, SystemError> {
+    run(world, patches, None, config)
+}
+
+/// As [`solve`], and tells besides what larger patches would have given, by the same rays:
+/// [`RadiositySolution::coarsening`] for the mesh `coarse` of the same scene, of about a quarter of
+/// the patches.
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_against(
+    world: &World,
+    patches: &Patches,
+    coarse: &Patches,
+    config: &RadiosityConfig,
+) -> Result<RadiositySolution, SystemError> {
+    let parents = error::parents(world.surfaces(), patches, coarse);
+    run(world, patches, Some(&parents), config)
+}
+
+fn run(
+    world: &World,
+    patches: &Patches,
+    parents: Option<&[PatchId]>,
     config: &RadiosityConfig,
 ) -> Result<RadiositySolution, SystemError> {
     let cast = rows::cast(world, patches, config);
@@ -151,6 +193,33 @@ pub fn solve(
     let system = System::new(&cast.rows, &areas, &reflectance, &source)?;
     let solution = solvers::jacobi(&system, &config.solver, solvers::no_progress);
     let ledger = Ledger::new(&system, &solution, &gathered, &cast.direct);
+    let coarsening = parents.map_or_else(Vec::new, |parents| {
+        let classes: Vec<u32> = parents
+            .iter()
+            .flat_map(|&parent| Class::all().map(|class| unknown(parent, class) as u32))
+            .collect();
+        let d = error::coarsening(
+            &cast.rows,
+            &classes,
+            &areas,
+            &reflectance,
+            &solution.radiosity,
+        );
+        patches
+            .ids()
+            .map(|patch| {
+                let own = Class::all().map(|class| unknown(patch, class));
+                let area: f64 = own.iter().map(|&u| areas[u]).sum();
+                let sum: Irradiance = own.iter().map(|&u| d[u] * areas[u]).sum();
+                // A patch inside a solid has no share of its area.
+                if area > 0.0 {
+                    sum * (1.0 / area)
+                } else {
+                    Irradiance::ZERO
+                }
+            })
+            .collect()
+    });
     let irradiance = solution
         .irradiance
         .iter()
@@ -160,6 +229,7 @@ pub fn solve(
     Ok(RadiositySolution {
         irradiance,
         rays: cast.weights,
+        coarsening,
         outcome: solution.outcome,
         iterations: solution.iterations,
         residual: solution.residual,

@@ -42,4 +42,6 @@ impl Stage {
     pub const RECIPROCITY: Self = Self(17);
     /// Points on surfaces at which methods are compared.
     pub const COMPARISON: Self = Self(20);
+    /// Points on lights, from the patches that may be divided.
+    pub const SUBDIVISION: Self = Self(22);
 }
