@@ -4,6 +4,7 @@
 //! Nothing here is needed by the product. What a test asserts stands in the test; what it needs to
 //! say it briefly stands here.
 
+pub mod accuracy;
 pub mod builder;
 pub mod cases;
 pub mod chi_squared;

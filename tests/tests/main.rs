@@ -10,6 +10,7 @@ mod form_factors;
 mod golden;
 mod hard_cases;
 mod hemicube;
+mod honesty;
 mod irradiance_fields;
 mod leaks;
 mod ray_cast;
