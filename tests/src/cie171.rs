@@ -34,6 +34,10 @@ const SKY_RAYS: u32 = 1 << 16;
 /// many are needed.
 const REFLECTION_RAYS: u32 = 1 << 18;
 
+/// Rays of the points whose mean is the inter-reflected light of a cube. More rays bring more patches,
+/// whose error all points share, so that the mean keeps it: up to 0.14 % at `--error 2%`, 0.11 % at 0.5 %.
+const INTER_REFLECTION: &str = "4096";
+
 /// A case as the file has it.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Case {
@@ -352,7 +356,8 @@ fn inter_reflection(case: &Case) -> Vec<Row> {
         .into_iter()
         .map(|(rho, reference)| {
             let mut room = rooms::isotropic_source(size, rho);
-            room.arguments = vec!["--components".to_owned(), "indirect".to_owned()];
+            let arguments = ["--components", "indirect", "--rays", INTER_REFLECTION];
+            room.arguments = arguments.map(str::to_owned).to_vec();
             let computed = probe(&room, points.iter().map(|point| point.place).collect());
             let pairs = points.iter().zip(&computed);
             let sum: f64 = pairs.map(|(point, found)| point.area * found.value).sum();
