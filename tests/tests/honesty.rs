@@ -1,8 +1,11 @@
 //! Stated errors against true ones: what `tests/ACCURACY.md` shows at length, on a few seeds.
 
 use luxel_tests::accuracy::scenes::{Summary, reference};
-use luxel_tests::accuracy::{Calibration, exact};
+use luxel_tests::accuracy::{Calibration, exact, noise};
 use luxel_tests::cases::{ambient_occlusion, irradiance_fields};
+
+/// Seeds over which the sampling part is compared with the scatter.
+const NOISE_SEEDS: u64 = 200;
 
 /// Seeds of the closed forms: some 55 of their values a seed are sampled, and 500 are needed to tell a
 /// share of 98.5 % from 99.9 % with three standard deviations.
@@ -61,4 +64,20 @@ fn closed_forms_are_as_wrong_as_they_say() {
         all = all.and(calibration);
     }
     assert_honest("all closed forms", &all);
+}
+
+/// 200 seeds know a mean z² to 0.02 and better when values are independent of each other. Noise of the
+/// solutions is shared by all of a seed: z² of a normal variable scatters by √2, which even for values
+/// that wholly go together makes √2/√200 = 0.1. The bounds are two and a half of these.
+#[test]
+fn noise_scatters_as_much_as_it_says() {
+    for (name, mean) in [
+        ("points, two gathers", noise::points(NOISE_SEEDS, 2)),
+        ("points, four gathers", noise::points(NOISE_SEEDS, 4)),
+    ] {
+        assert!(
+            (0.8..=1.25).contains(&mean),
+            "{name}: the mean of z² is {mean}"
+        );
+    }
 }

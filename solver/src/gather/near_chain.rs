@@ -36,6 +36,8 @@ struct Path {
     receiver: u32,
     ray: u32,
     throughput: Rgb,
+    /// What it has found so far.
+    found: Rgb,
 }
 
 /// What the rays of a receiver found, as sums of B over them.
@@ -50,7 +52,7 @@ pub(super) struct Found {
     looked_up: PerSolution,
     /// What was looked up less what the coarser mesh shows there, by solution.
     difference: PerSolution,
-    /// Squares of all contributions.
+    /// Squares of what each ray found altogether.
     squares: Rgb,
     /// Rays that met the back of a one-sided face.
     backs: u32,
@@ -58,24 +60,31 @@ pub(super) struct Found {
 
 impl Found {
     /// Takes in light that is emitted where a chain's link ends.
-    fn add_emitted(&mut self, link: u32, light: Rgb) {
+    fn add_emitted(&mut self, path: &mut Path, link: u32, light: Rgb) {
         if link == 0 {
-            self.squares += light * light;
+            self.add_square(path, light);
             self.direct += light;
         } else {
-            self.add_chained(light);
+            self.add_chained(path, light);
         }
     }
 
     /// Takes in direct light that a near hit reflects.
-    fn add_chained(&mut self, light: Rgb) {
-        self.squares += light * light;
+    fn add_chained(&mut self, path: &mut Path, light: Rgb) {
+        self.add_square(path, light);
         self.chained += light;
+    }
+
+    /// Makes the square of what a ray has found the square of that and more: (a + b)² = a² + b (2a + b).
+    fn add_square(&mut self, path: &mut Path, light: Rgb) {
+        self.squares += light * (2.0 * path.found + light);
+        path.found += light;
     }
 
     /// Takes in what was looked up at a hit.
     fn look_up(
         &mut self,
+        path: &mut Path,
         throughput: Rgb,
         fine: &[Vec3],
         coarse: Option<&[Vec3]>,
@@ -91,7 +100,7 @@ impl Found {
                 self.difference[s] += light - throughput * coarse[s].as_dvec3();
             }
         }
-        self.squares += mean * mean;
+        self.add_square(path, mean);
     }
 
     /// Adds the indirect light to a tally.
@@ -182,6 +191,7 @@ impl<'a> Chains<'a> {
                     receiver: slot as u32,
                     ray,
                     throughput: Rgb::ONE,
+                    found: Rgb::ZERO,
                 });
             }
         }
@@ -194,12 +204,14 @@ impl<'a> Chains<'a> {
         let mut near = Vec::new();
         for ((path, ray), hit) in self.paths.iter().zip(&self.rays).zip(&self.hits) {
             let found = &mut found[path.receiver as usize];
+            let mut path = *path;
             let Some(interaction) = self.world.interaction(ray, hit) else {
                 if link == 0 && self.sky_is_apart {
                     continue;
                 }
                 let sky = lights.sky(surfaces, ray.direction.as_dvec3());
-                found.add_emitted(link, path.throughput * sky.to_irradiance().0);
+                let light = path.throughput * sky.to_irradiance().0;
+                found.add_emitted(&mut path, link, light);
                 continue;
             };
             let (point, side) = (interaction.point, interaction.side);
@@ -210,7 +222,8 @@ impl<'a> Chains<'a> {
             }
             if !lights.is_source(interaction.face) {
                 let emitted = surfaces.emission(point).to_radiosity();
-                found.add_emitted(link, path.throughput * emitted.0);
+                let light = path.throughput * emitted.0;
+                found.add_emitted(&mut path, link, light);
             }
             let Some(lookup) = self.lookup else { continue };
             let throughput = path.throughput * surfaces.reflectance(point).0;
@@ -225,15 +238,11 @@ impl<'a> Chains<'a> {
             if hit.t >= REACH * patches.size(patch) || link == MAX_LINKS {
                 let fine = lookup.irradiance(patch, hit.t);
                 let coarse = lookup.coarse_irradiance(geometry, point, side, hit.t, REACH);
-                found.look_up(throughput, fine, coarse, lookup.range(self.solutions));
+                let range = lookup.range(self.solutions);
+                found.look_up(&mut path, throughput, fine, coarse, range);
             } else {
-                near.push((
-                    Path {
-                        throughput,
-                        ..*path
-                    },
-                    interaction.receiver,
-                ));
+                path.throughput = throughput;
+                near.push((path, interaction.receiver));
             }
         }
         near
@@ -267,7 +276,8 @@ impl<'a> Chains<'a> {
         self.paths.clear();
         self.rays.clear();
         for ((mut path, receiver), direct) in near.into_iter().zip(direct) {
-            found[path.receiver as usize].add_chained(path.throughput * direct.0);
+            let light = path.throughput * direct.0;
+            found[path.receiver as usize].add_chained(&mut path, light);
             let u = sequence(&path, Stage::NEAR_CHAIN).point4_f32(path.ray);
             if link > 0 {
                 let survival = path.throughput.max_element().min(1.0);
