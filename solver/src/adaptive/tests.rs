@@ -58,12 +58,12 @@ fn run(error: f64, left: usize) -> (Adaptive, usize) {
 #[test]
 fn it_goes_on_until_the_error_suits() {
     let (rough, _) = run(0.1, usize::MAX);
-    let (fine, _) = run(0.01, usize::MAX);
+    let (fine, _) = run(0.003, usize::MAX);
     assert_eq!(
         (rough.ending, fine.ending),
         (Ending::Reached, Ending::Reached)
     );
-    assert!(fine.parts.total() <= 0.01 && fine.parts.total() < rough.parts.total());
+    assert!(fine.parts.total() <= 0.003 && fine.parts.total() < rough.parts.total());
     assert!(fine.budget.rays > rough.budget.rays);
 }
 
