@@ -127,6 +127,12 @@ pub enum Alike {
     Neighbours,
     /// All are about equally noisy relative to their values.
     Values,
+    /// The values are the fractions of this many rays that are unblocked: binomial, and uncertain even
+    /// where all rays agree, (p n + 1)/(n + 2) of them (P.-S. Laplace's rule of succession, 1774).
+    Fractions {
+        /// Rays of a receiver.
+        rays: u32,
+    },
 }
 
 /// The error of a pixel, one standard deviation each, in the unit of the values.
@@ -234,6 +240,7 @@ impl Film {
             let levels: Vec<f64> = values.iter().map(|value| value[channel].powi(2)).collect();
             let expected = match alike {
                 Alike::Values => levels.clone(),
+                Alike::Fractions { rays } => fractions(&values, channel, rays),
                 Alike::Neighbours => self.neighbourhood(&scatters),
             };
             let sampling = moderate(&scatters, &expected, self.replicates - 1);
@@ -340,6 +347,16 @@ impl Film {
             })
             .collect()
     }
+}
+
+/// Variances of the fractions of `rays` independent rays.
+fn fractions(values: &[Rgb], channel: usize, rays: u32) -> Vec<f64> {
+    let rays = f64::from(rays);
+    let variance = |value: &Rgb| {
+        let p = (value[channel] * rays + 1.0) / (rays + 2.0);
+        p * (1.0 - p) / rays
+    };
+    values.iter().map(variance).collect()
 }
 
 fn image([width, height]: [usize; 2], values: impl Iterator<Item = Rgb>) -> Image {

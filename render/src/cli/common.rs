@@ -5,8 +5,8 @@ use clap::ValueEnum;
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 
-/// Options that every verb takes, before or after its name. Verbs that do not sample ignore the
-/// seed, so that scripts can pass the same options to all.
+/// Options that every verb takes, before or after its name. Verbs that do not sample ignore seed, error
+/// and time, so that scripts can pass the same options to all.
 #[derive(clap::Args, Clone, Debug)]
 #[command(next_help_heading = "Common options")]
 pub(super) struct Common {

@@ -15,7 +15,7 @@ use luxel_solver::world::World;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Seconds that a report takes when the number of sizes is not given.
+/// Seconds that a report takes when neither a time nor the number of sizes is given.
 const SECONDS: f64 = 60.0;
 
 /// Measure every method against one reference and write a report
@@ -23,8 +23,8 @@ const SECONDS: f64 = 60.0;
 /// The report is one HTML page without external parts: error against time, patches and rays, orders of
 /// convergence, stated against true error, solvers, energy, pictures of the error. The reference is the
 /// one given, the exact answer of a furnace, or luxel's own best with an independent seed. The report
-/// takes about a minute; how many sizes of each method fit in depends on the machine, unless --steps
-/// gives their number.
+/// takes about a minute, or the --time given; how many sizes of each method fit in depends on the
+/// machine, unless --steps gives their number.
 #[derive(clap::Args)]
 pub(super) struct Converge {
     /// Scene file (.toml), or geometry (.obj, .gltf, .glb)
@@ -97,7 +97,9 @@ impl Converge {
     ) -> Result<Study, Failure> {
         scene::require_light(world)?;
         let seed = context.common.seed;
-        let budget = self.steps.map_or(Budget::Seconds(SECONDS), Budget::Steps);
+        let time = context.common.time;
+        let seconds = time.map_or(SECONDS, |time| time.as_secs_f64());
+        let budget = self.steps.map_or(Budget::Seconds(seconds), Budget::Steps);
         let effort = budget.reference();
         let (target, reference) = reference::choose(world, camera, given, effort, seed)?;
         let setup = Setup {

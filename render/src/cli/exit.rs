@@ -47,6 +47,11 @@ impl Failure {
             error: error.into(),
         }
     }
+
+    /// The user stopped the work before there was anything to keep.
+    pub(super) fn interrupted() -> Self {
+        Self::new(ExitCode::Interrupted, "interrupted; nothing was written")
+    }
 }
 
 /// The exit code that an error of the library leads to.

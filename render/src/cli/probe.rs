@@ -5,7 +5,7 @@ use super::goal::Goal;
 use super::refine::refine;
 use super::scene;
 use super::stated::StatedError;
-use super::steering::{FIRST_ERROR, Steering};
+use super::steering::{Steering, first_error};
 use super::{Context, Session};
 use crate::files::Output;
 use crate::film::{Alike, Film};
@@ -259,7 +259,12 @@ impl Probe {
         let each = |all: u32| (all / (REPLICATES * rays)).max(1);
         let first = self.rays.map_or(each(fewest).max(FIRST_SAMPLES), each);
         let error = refine(&mut film, first, goal, &mut steering, add)?;
-        let errors = film.errors(Alike::Values)?;
+        let all_rays = film.samples() * REPLICATES * rays;
+        let alike = match self.quantity {
+            Quantity::Ao => Alike::Fractions { rays: all_rays },
+            Quantity::Irradiance => Alike::Values,
+        };
+        let errors = film.errors(alike)?;
         let estimates = film.values().zip(&errors);
         Some(Found {
             estimates: estimates
@@ -269,7 +274,7 @@ impl Probe {
                 })
                 .collect(),
             error: StatedError::of_samples(error.sampling, error.discretisation, 0.0),
-            budget: serde_json::json!({ "rays": film.samples() * REPLICATES * rays }),
+            budget: serde_json::json!({ "rays": all_rays }),
         })
     }
 
@@ -284,9 +289,7 @@ impl Probe {
     ) -> Result<Option<Found>, Failure> {
         let mut steering = Steering::new(context, goal);
         let config = AdaptiveConfig {
-            error: goal
-                .and_then(|goal| goal.error)
-                .map_or(FIRST_ERROR, |e| e.0),
+            error: first_error(goal),
             components,
             seed: context.common.seed,
         };

@@ -19,6 +19,10 @@ const MAX_GROWTH: f64 = 4.0;
 /// The smallest growth of a round: less, and its overhead counts.
 const MIN_GROWTH: f64 = 1.1;
 
+/// Noise that falls by less than this factor when samples are doubled is none of theirs: it is that of
+/// the solutions that they look up. (Noise of samples falls by 0.7 and less.)
+const STALLED: f64 = 0.95;
+
 /// Pieces of a round, after each of which it may be stopped: a film is valid after any sample.
 const PIECES: u32 = 16;
 
@@ -35,6 +39,7 @@ pub(super) fn refine(
     let receivers = film.size()[0] * film.size()[1];
     let error = goal.and_then(|goal| goal.error).map(|error| error.0);
     let mut wanted = first;
+    let mut before: Option<(u32, f64)> = None;
     loop {
         let round = wanted - film.samples();
         let cost = |samples: u32| f64::from(samples) * receivers as f64;
@@ -70,9 +75,13 @@ pub(super) fn refine(
             .ceil()
             .min(f64::from(MAX_SAMPLES)) as u32;
         let hopeless = error.is_some_and(|error| reached.discretisation * CONFIDENCE > error);
-        if next <= film.samples() || hopeless {
+        let stalled = before.is_some_and(|(samples, noise)| {
+            film.samples() >= 2 * samples && reached.sampling > STALLED * noise
+        });
+        if next <= film.samples() || hopeless || stalled {
             return Some(reached);
         }
+        before = Some((film.samples(), reached.sampling));
         wanted = next;
     }
 }

@@ -5,8 +5,8 @@ use super::goal::Goal;
 use super::refine::refine;
 use super::scene;
 use super::stated::StatedError;
-use super::steering::Steering;
-use super::transport::Transport;
+use super::steering::{Steering, first_error};
+use super::transport::{Transport, VIEW_PATCHES};
 use super::{Context, Session};
 use crate::camera::CameraFrame;
 use crate::files::Output;
@@ -30,6 +30,7 @@ use luxel_solver::audit;
 use luxel_solver::bvh::{Hit, Ray};
 use luxel_solver::gather::{Components, Lookup};
 use luxel_solver::world::{Receiver, World};
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 /// Rays for indirect light of a camera sample: with 16 samples 256 a pixel.
@@ -38,8 +39,12 @@ const GATHER_RAYS: usize = 16;
 /// Shadow rays of a camera sample, unless a pilot says better.
 const SHADOW_RAYS: usize = 4;
 
-/// Patches of the solution for a fixed number of samples, or a time.
+/// Patches of the solution for a fixed number of samples.
 const GATHER_PATCHES: usize = 6000;
+
+/// Refinement of a mesh whose error, or noise, is too large, and the most patches.
+const FINER: usize = 4;
+const MOST_PATCHES: usize = 1_000_000;
 
 /// Samples of a pixel that a refinement begins with.
 const FIRST_SAMPLES: u32 = 8;
@@ -211,7 +216,7 @@ impl Render {
     ) -> Result<Option<Exposed>, Failure> {
         let seed = context.common.seed;
         let show = |integrator: &dyn Integrator, solver_bound: f64| {
-            Ok(self.refine(integrator, frame, solver_bound, goal, context))
+            self.refine(integrator, frame, solver_bound, goal, context)
         };
         match self.integrator {
             Method::Ao => {
@@ -221,32 +226,58 @@ impl Render {
                     falloff: self.falloff,
                     seed,
                 };
-                show(&AmbientOcclusion::new(world, config), 0.0)
+                Ok(show(&AmbientOcclusion::new(world, config), 0.0))
             }
-            Method::Path => show(&PathTracer::new(world, seed), 0.0),
+            Method::Path => Ok(show(&PathTracer::new(world, seed), 0.0)),
             Method::Radiosity => {
-                let transport = Transport::view(world, context)?;
-                let view = RadiosityView::new(world, &transport.patches, &transport.solutions);
-                show(&view, 0.0)
+                let mut patches = VIEW_PATCHES;
+                loop {
+                    let fine = Transport::view(world, patches, context)?;
+                    let coarse = Transport::view(world, patches / 4, context)?;
+                    let view = RadiosityView::new(world, &fine.patches, &fine.solutions)
+                        .with_coarse(&coarse.patches, &coarse.solutions);
+                    let shown = show(&view, fine.solver_bound() / PI);
+                    if !needs_finer(shown.as_ref(), goal, patches, context) {
+                        return Ok(shown);
+                    }
+                    patches *= FINER;
+                }
             }
             Method::Gather | Method::Whitted => {
-                let Some((lookup, config)) = prepare(world, frame, goal, context)? else {
+                let Some(Prepared {
+                    scene,
+                    mut lookup,
+                    mut patches,
+                    config,
+                }) = prepare(world, frame, goal, context)?
+                else {
                     return Ok(None);
                 };
-                let gatherer = Gatherer::new(world, &lookup, config);
-                // What a bound on E leaves of L = ρE/π, for ρ up to one.
-                let solver_bound = lookup.solver_bound() / std::f64::consts::PI;
-                if self.integrator == Method::Gather {
-                    show(&gatherer, solver_bound)
-                } else {
-                    let config = whitted::Config {
-                        depth: WHITTED_DEPTH,
-                        highlight: Highlight::BlinnPhong,
-                        ambient: Irradiance::ZERO,
-                        shadow_rays: SHADOW_RAYS,
-                        seed,
+                loop {
+                    let gatherer = Gatherer::new(world, &lookup, config);
+                    // What a bound on E leaves of L = ρE/π, for ρ up to one.
+                    let solver_bound = lookup.solver_bound() / PI;
+                    let shown = if self.integrator == Method::Gather {
+                        show(&gatherer, solver_bound)
+                    } else {
+                        let config = whitted::Config {
+                            depth: WHITTED_DEPTH,
+                            highlight: Highlight::BlinnPhong,
+                            ambient: Irradiance::ZERO,
+                            shadow_rays: SHADOW_RAYS,
+                            seed,
+                        };
+                        show(&Whitted::new(world, Some(gatherer), config), solver_bound)
                     };
-                    show(&Whitted::new(world, Some(gatherer), config), solver_bound)
+                    if !needs_finer(shown.as_ref(), goal, patches, context) {
+                        return Ok(shown);
+                    }
+                    patches *= FINER;
+                    let mut steering = Steering::new(context, goal);
+                    match scene.solve(patches, &mut steering)? {
+                        Some(finer) => lookup = finer,
+                        None => return Ok(shown),
+                    }
                 }
             }
         }
@@ -348,13 +379,41 @@ fn error_layers(film: &Film) -> Vec<(String, Image)> {
     ]
 }
 
+/// Whether an error was missed that a finer mesh may reach: what samples cannot lessen is left.
+fn needs_finer(
+    shown: Option<&Exposed>,
+    goal: Option<&Goal>,
+    patches: usize,
+    context: &Context<'_>,
+) -> bool {
+    let Some(Exposed {
+        error: Some(error), ..
+    }) = shown
+    else {
+        return false;
+    };
+    let in_time = goal.is_none_or(|goal| goal.time_left().is_none_or(|left| !left.is_zero()));
+    error.exit(goal) == ExitCode::TargetMissed
+        && patches * FINER <= MOST_PATCHES
+        && in_time
+        && !context.interrupt.is_set()
+}
+
+/// What a gather looks up, and how.
+struct Prepared<'w, 's> {
+    scene: Adapted<'w, 's>,
+    lookup: Lookup,
+    patches: usize,
+    config: gather::Config,
+}
+
 /// Solutions that are good enough for the goal at what the camera sees, and how to gather from them.
-fn prepare(
-    world: &World<'_>,
+fn prepare<'w, 's>(
+    world: &'w World<'s>,
     frame: &CameraFrame,
     goal: Option<&Goal>,
     context: &Context<'_>,
-) -> Result<Option<(Lookup, gather::Config)>, Failure> {
+) -> Result<Option<Prepared<'w, 's>>, Failure> {
     let seed = context.common.seed;
     let mut steering = Steering::new(context, goal);
     let scene = Adapted::new(world, seed)?;
@@ -364,13 +423,17 @@ fn prepare(
         seed,
     };
     let seen = first_hits(world, frame);
-    let error = goal.and_then(|goal| goal.error);
-    let (Some(error), false) = (error, seen.is_empty()) else {
+    if goal.is_none() || seen.is_empty() {
         let solved = scene.solve(GATHER_PATCHES, &mut steering)?;
-        return Ok(solved.map(|lookup| (lookup, config)));
-    };
+        return Ok(solved.map(|lookup| Prepared {
+            scene,
+            lookup,
+            patches: GATHER_PATCHES,
+            config,
+        }));
+    }
     let wanted = AdaptiveConfig {
-        error: error.0,
+        error: first_error(goal),
         components: Components::All,
         seed,
     };
@@ -380,7 +443,12 @@ fn prepare(
         let ratio = budget.shadow_rays as f64 / budget.rays as f64;
         let shadow_rays = (ratio * GATHER_RAYS as f64).round() as usize;
         config.shadow_rays = shadow_rays.clamp(1, GATHER_RAYS);
-        (lookup, config)
+        Prepared {
+            scene,
+            lookup,
+            patches: budget.patches,
+            config,
+        }
     }))
 }
 

@@ -80,7 +80,7 @@ impl Solve {
         if self.form_factors.is_some() || self.resolution.is_some() {
             Method::check_options(self.form_factors, self.rays, self.resolution)?;
         }
-        let started = Instant::now();
+        let started = session.context.started;
         let output = self.output.as_deref().map(Output::prepare).transpose()?;
         let scene = scene::read(&self.scene, &session.context)?;
         let loaded = started.elapsed().as_secs_f64();
@@ -120,7 +120,9 @@ impl Solve {
             report.to_table()
         };
         session.print(&text)?;
-        Ok(if missed {
+        Ok(if session.context.interrupt.is_set() {
+            ExitCode::Interrupted
+        } else if missed {
             ExitCode::TargetMissed
         } else {
             ExitCode::Ok

@@ -15,12 +15,31 @@ use std::time::{Duration, Instant};
 /// more than one run in twenty is worse than asked for; larger, and all pay for it.
 pub(super) const CONFIDENCE: f64 = 1.1;
 
-/// The error that is planned for first when only time is given.
-pub(super) const FIRST_ERROR: f64 = 0.05;
+/// The error that is planned for first when time is limited: what it takes is had in a moment.
+const FIRST_ERROR: f64 = 0.05;
+
+/// The error to plan for first. Under a limit of time a rough result comes before a good one.
+pub(super) fn first_error(goal: Option<&Goal>) -> f64 {
+    let error = goal.and_then(|goal| goal.error).map(|error| error.0);
+    let timed = goal.is_some_and(|goal| goal.time_left().is_some());
+    match error {
+        Some(error) if !timed => error,
+        _ => error.unwrap_or(FIRST_ERROR).max(FIRST_ERROR),
+    }
+}
 
 /// Work is not begun when less than this share of it fits into the time left: its results would not
 /// be worth the wait. The first result is worth it anyhow.
 const LEAST_SHARE: f64 = 0.05;
+
+/// The name of a stage with the error so far and the one that is aimed at.
+pub(super) fn stage(name: &str, estimate: Option<f64>, goal: Option<&Goal>) -> String {
+    match (estimate, goal.and_then(|goal| goal.error)) {
+        (Some(now), Some(aim)) => format!("{name} ({:.2} % → {} %)", 100.0 * now, 100.0 * aim.0),
+        (Some(now), None) => format!("{name} ({:.2} %)", 100.0 * now),
+        (None, _) => name.to_owned(),
+    }
+}
 
 /// A control with a goal.
 pub(super) struct Steering<'a, 'r> {
@@ -86,14 +105,7 @@ impl<'a, 'r> Steering<'a, 'r> {
 
     /// Work begins.
     pub(super) fn start(&mut self, name: &str, cost: f64, parts: usize) {
-        let aim = self.goal.and_then(|goal| goal.error);
-        let name = match (self.estimate, aim) {
-            (Some(now), Some(aim)) => {
-                format!("{name} ({:.2} % → {} %)", 100.0 * now, 100.0 * aim.0)
-            }
-            (Some(now), None) => format!("{name} ({:.2} %)", 100.0 * now),
-            _ => name.to_owned(),
-        };
+        let name = stage(name, self.estimate, self.goal);
         self.reporter.start(&name, parts as u64);
         self.current = Some((cost, Instant::now()));
     }

@@ -3,6 +3,7 @@
 use super::Context;
 use super::exit::Failure;
 use crate::progress::Progress;
+use luxel_solver::gather::MAX_REPLICATES;
 use luxel_solver::patches::{PatchSize, Patches};
 use luxel_solver::radiosity::{RadiosityConfig, RadiositySolution, solve};
 use luxel_solver::solvers::{Config, Tolerance};
@@ -12,10 +13,13 @@ use luxel_solver::world::World;
 const SHADOW_RAYS: usize = 1;
 
 /// Patches of a solution that is shown itself: the picture has no finer detail.
-const VIEW_PATCHES: usize = 10_000;
+pub(super) const VIEW_PATCHES: usize = 10_000;
 
-/// Rays of a row in a solution that is shown itself, where noise is seen as mottling.
-const VIEW_ROW_RAYS: usize = 256;
+/// Independent solutions, whose scatter is the noise of the picture.
+const SOLUTIONS: u64 = MAX_REPLICATES as u64;
+
+/// Rays of a row in each of them: noise is seen as mottling.
+const VIEW_ROW_RAYS: usize = 64;
 
 /// Bound on the error that the iteration may leave, relative to the brightest patch: small beside
 /// every other error, and cheap.
@@ -31,31 +35,42 @@ pub(super) struct Transport {
 }
 
 impl Transport {
-    /// Meshes and solves for a picture of the solution.
-    pub(super) fn view(world: &World<'_>, context: &Context<'_>) -> Result<Self, Failure> {
+    /// Meshes into about `patches` patches and solves for a picture of the solution.
+    pub(super) fn view(
+        world: &World<'_>,
+        patches: usize,
+        context: &Context<'_>,
+    ) -> Result<Self, Failure> {
         let reporter = &context.reporter;
-        let patches = world.mesh(PatchSize::Count(VIEW_PATCHES))?;
-        reporter.start("solving radiosity", 1);
-        let config = RadiosityConfig {
-            rays: VIEW_ROW_RAYS,
-            shadow_rays: SHADOW_RAYS,
-            solver: Config {
-                tolerance: Tolerance::Error(TOLERANCE),
-                max_iterations: MAX_ITERATIONS,
-            },
-            seed: context.common.seed,
-            replicate: 0,
-        };
-        let solution = solve(world, &patches, &config)?;
+        let patches = world.mesh(PatchSize::Count(patches))?;
+        reporter.start("solving radiosity", SOLUTIONS);
+        let mut solutions = Vec::new();
+        for replicate in 0..SOLUTIONS {
+            let config = RadiosityConfig {
+                rays: VIEW_ROW_RAYS,
+                shadow_rays: SHADOW_RAYS,
+                solver: Config {
+                    tolerance: Tolerance::Error(TOLERANCE),
+                    max_iterations: MAX_ITERATIONS,
+                },
+                seed: context.common.seed,
+                replicate,
+            };
+            solutions.push(solve(world, &patches, &config)?);
+            reporter.advance(1);
+        }
         reporter.finish();
         reporter.detail(format_args!(
-            "{} patches, {VIEW_ROW_RAYS} rays a row, {} sweeps",
+            "{} patches, {SOLUTIONS} solutions of {VIEW_ROW_RAYS} rays a row, {} sweeps",
             patches.len(),
-            solution.iterations
+            solutions[0].iterations
         ));
-        Ok(Self {
-            patches,
-            solutions: vec![solution],
-        })
+        Ok(Self { patches, solutions })
+    }
+
+    /// Bound on what the iteration leaves of any irradiance, in W/m².
+    pub(super) fn solver_bound(&self) -> f64 {
+        let bounds = self.solutions.iter().map(|s| s.error_bound.max_element());
+        bounds.fold(0.0, f64::max)
     }
 }

@@ -17,16 +17,26 @@ use luxel_solver::world::World;
 /// The integrator.
 pub struct RadiosityView<'w> {
     world: &'w World<'w>,
+    fine: Field<'w>,
+    coarse: Option<Field<'w>>,
+}
+
+/// A mesh with the irradiance of its independent solutions.
+struct Field<'w> {
     patches: &'w Patches,
     display: Display,
-    /// Irradiance at the display's vertices.
+    solutions: Vec<Values>,
+}
+
+/// Irradiance in one solution.
+struct Values {
     at_vertices: Vec<Rgb>,
-    /// Irradiance of the patches.
     of_patches: Vec<Rgb>,
 }
 
 impl<'w> RadiosityView<'w> {
-    /// A view of the mean of `solutions` (at least one) over `patches` of `world`.
+    /// A view of `solutions` (at least one) over `patches` of `world`: replicate r of a pixel sees
+    /// solution r, modulo their number.
     ///
     /// # Panics
     /// When there is no solution.
@@ -35,54 +45,95 @@ impl<'w> RadiosityView<'w> {
         patches: &'w Patches,
         solutions: &[RadiositySolution],
     ) -> Self {
-        assert!(!solutions.is_empty(), "a view needs a solution");
-        let share = 1.0 / solutions.len() as f64;
-        let mean = |patch| -> Irradiance {
-            let values = solutions
-                .iter()
-                .map(|solution| solution.mean_irradiance(patch));
-            values.sum::<Irradiance>() * share
-        };
-        let of_patches: Vec<Rgb> = patches.ids().map(|patch| mean(patch).0).collect();
-        let is_exposed = |patch| solutions.iter().any(|solution| solution.is_exposed(patch));
-        let exposed: Vec<bool> = patches.ids().map(is_exposed).collect();
-        let display = Display::new(world, patches, &exposed, |_, _| true);
         Self {
             world,
-            patches,
-            at_vertices: display.at_vertices(&of_patches),
-            display,
-            of_patches,
+            fine: Field::new(world, patches, solutions),
+            coarse: None,
         }
     }
 
-    fn reflected(&self, vertex: &Vertex<'_>) -> Rgb {
+    /// Adds a coarser mesh with solutions of its own, for the error that patches make.
+    ///
+    /// # Panics
+    /// When there is no solution.
+    #[must_use]
+    pub fn with_coarse(mut self, patches: &'w Patches, solutions: &[RadiositySolution]) -> Self {
+        self.coarse = Some(Field::new(self.world, patches, solutions));
+        self
+    }
+
+    fn reflected(&self, vertex: &Vertex<'_>, replicate: u32) -> Seen {
+        let radiance = |irradiance: Rgb| {
+            (vertex.reflectance() * Irradiance(irradiance))
+                .to_radiance()
+                .0
+        };
+        let fine = radiance(self.fine.at(self.world, vertex, replicate));
+        let coarse = self
+            .coarse
+            .as_ref()
+            .map(|coarse| radiance(coarse.at(self.world, vertex, replicate)));
+        Seen {
+            value: fine,
+            mesh_difference: fine - coarse.unwrap_or(fine),
+        }
+    }
+}
+
+impl<'w> Field<'w> {
+    fn new(world: &'w World<'w>, patches: &'w Patches, solutions: &[RadiositySolution]) -> Self {
+        assert!(!solutions.is_empty(), "a view needs a solution");
+        let is_exposed = |patch| solutions.iter().any(|solution| solution.is_exposed(patch));
+        let exposed: Vec<bool> = patches.ids().map(is_exposed).collect();
+        let display = Display::new(world, patches, &exposed, |_, _| true);
+        let values = |solution: &RadiositySolution| {
+            let of_patches: Vec<Rgb> = patches
+                .ids()
+                .map(|patch| solution.mean_irradiance(patch).0)
+                .collect();
+            Values {
+                at_vertices: display.at_vertices(&of_patches),
+                of_patches,
+            }
+        };
+        Self {
+            patches,
+            solutions: solutions.iter().map(values).collect(),
+            display,
+        }
+    }
+
+    /// Irradiance at a vertex in W/m².
+    fn at(&self, world: &World<'_>, vertex: &Vertex<'_>, replicate: u32) -> Rgb {
         let interaction = &vertex.interaction;
         let point = interaction.point;
-        let geometry = self.world.surfaces().geometry();
-        let patch = self
-            .patches
-            .at(geometry, point.triangle, point.u, point.v, interaction.side);
-        let irradiance = patch.map_or(Irradiance::ZERO, |patch| {
-            let position = interaction.receiver.position;
-            let smooth = self
-                .display
-                .interpolate(&self.at_vertices, patch, point, position);
-            Irradiance(smooth.unwrap_or(self.of_patches[patch.index()]))
-        });
-        (vertex.reflectance() * irradiance).to_radiance().0
+        let geometry = world.surfaces().geometry();
+        let Some(patch) =
+            self.patches
+                .at(geometry, point.triangle, point.u, point.v, interaction.side)
+        else {
+            return Rgb::ZERO;
+        };
+        let values = &self.solutions[replicate as usize % self.solutions.len()];
+        let position = interaction.receiver.position;
+        self.display
+            .interpolate(&values.at_vertices, patch, point, position)
+            .unwrap_or(values.of_patches[patch.index()])
     }
 }
 
 impl Integrator for RadiosityView<'_> {
-    fn estimate(&self, rays: &[CameraRay], _keys: &[SampleKey], seen: &mut [Seen]) {
+    fn estimate(&self, rays: &[CameraRay], keys: &[SampleKey], seen: &mut [Seen]) {
         let (rays, hits) = cast(self.world, rays);
-        for ((ray, hit), seen) in rays.iter().zip(&hits).zip(seen) {
-            let value = Vertex::new(self.world, ray, hit).map_or_else(
-                || background(self.world, ray),
-                |vertex| vertex.emission().0 + self.reflected(&vertex),
-            );
-            *seen = value.into();
+        for (((ray, hit), key), seen) in rays.iter().zip(&hits).zip(keys).zip(seen) {
+            *seen = match Vertex::new(self.world, ray, hit) {
+                None => background(self.world, ray).into(),
+                Some(vertex) => {
+                    let mut sum = Seen::from(vertex.emission().0);
+                    sum += self.reflected(&vertex, key.replicate);
+                    sum
+                }
+            };
         }
     }
 }

@@ -464,7 +464,13 @@ pub(super) fn plain(value: f64) -> String {
             text
         };
     }
-    let mantissa = value / 10_f64.powi(exponent);
+    // Two digits, so that 9.96 becomes the next power and not ten times this one.
+    let mantissa = (value / 10_f64.powi(exponent) * 10.0).round() / 10.0;
+    let (mantissa, exponent) = if mantissa.abs() >= 10.0 {
+        (mantissa / 10.0, exponent + 1)
+    } else {
+        (mantissa, exponent)
+    };
     let power: String = exponent.to_string().chars().map(superscript).collect();
     if (mantissa - 1.0).abs() < 1e-6 {
         format!("10{power}")
@@ -513,6 +519,8 @@ mod tests {
             (200.0, "200"),
             (1e6, "10⁶"),
             (2e-5, "2·10⁻⁵"),
+            (9.98e-6, "10⁻⁵"),
+            (1.04e6, "10⁶"),
         ] {
             assert_eq!(plain(value), expected);
         }

@@ -204,7 +204,7 @@ pub fn choose(
 }
 
 /// The layer of an EXR picture that holds its standard errors.
-const ERROR_LAYER: &str = "standard_error";
+const ERROR_LAYER: &str = "error";
 
 /// The exact answer at a target, or luxel's own best.
 ///

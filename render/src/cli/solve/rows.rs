@@ -6,6 +6,7 @@ use crate::accuracy::{Accuracy, RelativeErrors};
 use crate::cli::Context;
 use crate::cli::exit::Failure;
 use crate::cli::goal::Goal;
+use crate::cli::steering::stage;
 use crate::progress::Progress;
 use luxel_scenes::{Irradiance, Rgb};
 use luxel_solver::patches::{Density, PatchSize, Patches};
@@ -96,7 +97,8 @@ impl Task<'_> {
         };
         if let Some(rays) = self.rays {
             let meshes = self.meshes(world, density.as_ref(), PATCHES, context)?;
-            return self.round(world, meshes, rays, 0, context);
+            let solved = self.round(world, meshes, rays, 0, None, context)?;
+            return solved.ok_or_else(Failure::interrupted);
         }
         let target = self.goal.error.map(|error| error.0);
         let mut budget = Budget::first(target.unwrap_or(FIRST_TIMED_ERROR));
@@ -105,10 +107,17 @@ impl Task<'_> {
             budget.patches = meshes.mesh.len();
         }
         let mut best: Option<Solved> = None;
+        let mut listening = None;
         for round in 0.. {
             let started = Instant::now();
             let meshes = self.meshes(world, density.as_ref(), budget.patches, context)?;
-            let solved = self.round(world, meshes, budget.rays, round, context)?;
+            let known = best.as_ref().map(|best| best.errors.total());
+            let Some(solved) = self.round(world, meshes, budget.rays, round, known, context)?
+            else {
+                break;
+            };
+            // From now on there is something to keep.
+            listening.get_or_insert_with(|| context.interrupt.listen());
             let errors = solved.errors;
             context.reporter.detail(format_args!(
                 "{} patches, {} rays a row: estimated error {:.2} % (sampling {:.2} %, \
@@ -135,7 +144,7 @@ impl Task<'_> {
                 None => break,
             }
         }
-        Ok(best.expect("there is a first round"))
+        best.ok_or_else(Failure::interrupted)
     }
 
     /// The budget of the next round; `None` when there is no more of it or of time.
@@ -198,17 +207,20 @@ impl Task<'_> {
         Ok(Meshes { mesh, other })
     }
 
-    /// Solves all replicates of a round.
+    /// Solves all replicates of a round; `known` is the error of the best one so far. `None` after an
+    /// interrupt.
     fn round(
         &self,
         world: &World<'_>,
         Meshes { mesh, other }: Meshes,
         rays: usize,
         round: u64,
+        known: Option<f64>,
         context: &Context<'_>,
-    ) -> Result<Solved, Failure> {
+    ) -> Result<Option<Solved>, Failure> {
         let reporter = &context.reporter;
-        reporter.start("solving radiosity", REPLICATES);
+        let stage = stage("solving radiosity", known, Some(self.goal));
+        reporter.start(&stage, REPLICATES);
         let mut solutions = Vec::new();
         let mut coarsening = Vec::new();
         for replicate in 0..REPLICATES {
@@ -226,6 +238,10 @@ impl Task<'_> {
                 }
             }
             reporter.advance(1);
+            if context.interrupt.is_set() {
+                reporter.finish();
+                return Ok(None);
+            }
         }
         reporter.finish();
         let irradiance: Vec<Vec<Irradiance>> = solutions
@@ -249,14 +265,14 @@ impl Task<'_> {
             .map(|s| s.error_bound)
             .fold(Rgb::ZERO, Rgb::max);
         let errors = accuracy.relative(&areas, bound);
-        Ok(Solved {
+        Ok(Some(Solved {
             patches: mesh,
             solutions,
             irradiance,
             coarsening,
             accuracy,
             errors,
-        })
+        }))
     }
 }
 
