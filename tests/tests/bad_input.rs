@@ -3,6 +3,7 @@
 
 use luxel::cli::ExitCode;
 use luxel_tests::command::{Outcome, arg, luxel};
+use luxel_tests::picture::example;
 use std::path::Path;
 
 const MTL: &str = "newmtl grey\nKd 0.5 0.5 0.5\nnewmtl lamp\nKd 0 0 0\nKe 5 5 5\n";
@@ -453,4 +454,74 @@ fn wrong_arguments_are_usage_errors() {
     ] {
         refuses(&files, arguments, ExitCode::Usage, &[]);
     }
+}
+
+/// Errors and times that cannot be asked for, whatever the verb.
+#[test]
+fn goals_that_make_no_sense_are_usage_errors() {
+    let files = Files::good();
+    let render = ["render", "{}/s.toml", "-o", "{}/out.exr"];
+    let probe = ["probe", "{}/s.toml", "--points", "{}/p.csv"];
+    for verb in [&render[..], &probe] {
+        for (goal, mention) in [
+            (["--error", "0%"], "above 0%"),
+            (["--error", "-1%"], "above 0%"),
+            (["--error", "100%"], "below 100%"),
+            (["--error", "NaN%"], "above 0%"),
+            (["--error", "1"], "percentage"),
+            (["--error", "0.00001%"], "single-precision"),
+            (["--time", "0s"], "above 0"),
+            (["--time", "NaNs"], "above 0"),
+            (["--time", "5"], "unit"),
+        ] {
+            let arguments = [verb, &goal].concat();
+            refuses(&files, &arguments, ExitCode::Usage, &[goal[0], mention]);
+        }
+    }
+    let both = [&probe[..], &["--rays", "64", "--error", "1%"]].concat();
+    refuses(&files, &both, ExitCode::Usage, &["--rays", "--error"]);
+    let both = [&render[..], &["--spp", "4", "--time", "1s"]].concat();
+    refuses(&files, &both, ExitCode::Usage, &["--spp", "--time"]);
+}
+
+/// An error that the time does not allow: the result is written, says what was reached, and the exit
+/// code tells.
+#[test]
+fn a_missed_error_is_told_and_the_result_kept() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let points = "x,y,z,nx,ny,nz\n0.2,0,0.2,0,1,0\n0.3,0,0.3,0,1,0\n";
+    std::fs::write(folder.path().join("p.csv"), points).expect("a writable folder");
+    let cornell = example("cornell");
+    for (verb, file) in [
+        (
+            &["probe", arg(&cornell), "--points", "{}/p.csv"][..],
+            "out.csv",
+        ),
+        (&["render", arg(&cornell), "--size", "16x16"], "out.exr"),
+        (&["solve", arg(&cornell)], "out.ply"),
+    ] {
+        let output = format!("{{}}/{file}");
+        let goal = ["--error", "0.01%", "--time", "1s", "--json", "-o", &output];
+        let outcome = run(folder.path(), &[verb, &goal].concat());
+        assert_eq!(outcome.exit, ExitCode::TargetMissed, "{outcome:?}");
+        let error = &outcome.json()["error"];
+        assert_eq!(error["reached"], false);
+        let total = error["total"].as_f64();
+        assert!(total.is_some_and(|e| e > 1e-4), "{error}");
+        assert!(folder.path().join(file).exists());
+    }
+}
+
+/// An open scene under a sky has an answer: what escapes does not come back.
+#[test]
+fn an_open_scene_under_a_sky_is_no_error() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let sky = "[[light]]\nkind = \"sky\"\nmodel = \"uniform\"\nradiance = 1\n";
+    Files::toml(sky).write(folder.path());
+    let arguments = ["probe", "{}/s.toml", "--points", "{}/p.csv", "--json"];
+    let outcome = run(folder.path(), &arguments);
+    outcome.assert_success();
+    let json = outcome.json();
+    assert_eq!(json["error"]["reached"], true);
+    assert!(json["mean"][0].as_f64().is_some_and(|e| e > 0.0));
 }
