@@ -4,7 +4,7 @@
 //! vertices on its border. A vertex that hangs in the middle of a larger patch's edge is a corner of
 //! that patch, too, so that both sides agree along every edge and meshes have no T-junctions
 //! (D. R. Baum, S. Mann, K. P. Smith, J. M. Winget, "Making Radiosity Usable", SIGGRAPH 1991). Patches
-//! share a vertex when nothing separates them there: their normals lie within [`CREASE`] of each
+//! share a vertex when nothing separates them there: their normals lie within `CREASE` of each
 //! other and a short ray from one to the other passes. A patch whose middle does not see its own
 //! corner (a body stands between) leaves the value there to the others, and so does one inside a
 //! solid. For display only: interpolation does not lower the error of a radiosity solution.

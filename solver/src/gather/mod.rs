@@ -55,7 +55,8 @@ pub enum Components {
 pub enum SkyRays {
     /// The gather rays that leave the scene; they cost nothing.
     Gather,
-    /// Rays of its own, as many as shadow rays, at the outlines of openings ([`Dome`]).
+    /// Rays of its own, as many as shadow rays, at the outlines of openings
+    /// (`direct::dome`).
     Apart,
 }
 
