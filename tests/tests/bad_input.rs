@@ -489,7 +489,7 @@ fn goals_that_make_no_sense_are_usage_errors() {
 #[test]
 fn a_missed_error_is_told_and_the_result_kept() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let points = "x,y,z,nx,ny,nz\n0.2,0,0.2,0,1,0\n0.3,0,0.3,0,1,0\n";
+    let points = "x,y,z,nx,ny,nz\n0.05,0,0.05,0,1,0\n0.1,0,0.05,0,1,0\n";
     std::fs::write(folder.path().join("p.csv"), points).expect("a writable folder");
     let cornell = example("cornell");
     for (verb, file) in [
