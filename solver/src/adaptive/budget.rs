@@ -5,8 +5,9 @@
 //!   e² = Σ_k e_k² (x_k / x'_k)^(2 b_k),   cost = Σ_k c_k x'_k,
 //!
 //! where e_k was measured at the budget x_k. The cheapest x'_k for a given e satisfy
-//! 2 b_k e_k²(x'_k) = λ c_k x'_k with one λ for all (Lagrange): each part's squared error times its
-//! exponent is in proportion to what it costs. λ is found by bisection. Cost: nothing.
+//! Σ 2 b_k e_k²(x'_k) = λ c_k x'_k with one λ for all (Lagrange), the sum over the parts that the same
+//! budget lessens: each part's squared error times its exponent is in proportion to what it costs. x'
+//! and λ are found by bisection. Cost: nothing.
 //!
 //! Source: the allocation rule of stratified sampling (J. Neyman, "On the two different aspects of
 //! the representative method", 1934) with measured exponents in place of 1/2.
@@ -28,11 +29,12 @@ pub struct Budget {
 /// classes, whose rows are then often empty.
 pub const ROW_RAYS: usize = 32;
 
-/// Exponents with which errors fall, measured on the reference scenes: that of mesh and solution
-/// together with the number of patches (0.5 for the noise, 0.6 for the size), of gather rays
-/// (0.62–0.73) and of shadow rays (0.6–0.75). Too large, and a second round adds the missing rays;
-/// too small, and the first casts too many.
-const PATCH_EXPONENT: f64 = 0.55;
+/// Exponents with which errors fall, measured on the reference scenes: the noise of the solution and the
+/// stated error of the mesh with the number of patches (0.5; 0.7–1.1, where the error itself falls with
+/// 0.6), those of gather rays (0.62–0.73) and of shadow rays (0.6–0.75). Too large, and a second round
+/// adds what is missing; too small, and the first spends too much.
+const SOLUTION_EXPONENT: f64 = 0.5;
+const MESH_EXPONENT: f64 = 0.9;
 const RAY_EXPONENT: f64 = 0.7;
 const SHADOW_EXPONENT: f64 = 0.7;
 
@@ -94,22 +96,22 @@ impl Budget {
         let items = [
             Item {
                 spent: self.patches as f64,
-                square: parts.solution.powi(2) + parts.mesh.powi(2),
-                exponent: PATCH_EXPONENT,
+                parts: vec![
+                    (parts.solution.powi(2), SOLUTION_EXPONENT),
+                    (parts.mesh.powi(2), MESH_EXPONENT),
+                ],
                 cost: patch_cost(),
                 limits: PATCHES,
             },
             Item {
                 spent: self.rays as f64,
-                square: parts.gather.powi(2),
-                exponent: RAY_EXPONENT,
+                parts: vec![(parts.gather.powi(2), RAY_EXPONENT)],
                 cost: receivers,
                 limits: [fewest.max(RAYS[0]), RAYS[1]],
             },
             Item {
                 spent: self.shadow_rays as f64,
-                square: parts.direct.powi(2),
-                exponent: SHADOW_EXPONENT,
+                parts: vec![(parts.direct.powi(2), SHADOW_EXPONENT)],
                 cost: receivers * SHADOW_RAY_COST,
                 limits: [fewest.max(SHADOW_RAYS[0]), SHADOW_RAYS[1]],
             },
@@ -174,25 +176,45 @@ fn even(rays: f64) -> usize {
     (rays as usize).next_multiple_of(MAX_REPLICATES)
 }
 
-/// One part of the error with what lessens it.
+/// What can be spent on, with the parts of the error that it lessens.
 struct Item {
     spent: f64,
-    square: f64,
-    exponent: f64,
+    /// Squares and exponents.
+    parts: Vec<(f64, f64)>,
     cost: f64,
     limits: [usize; 2],
 }
 
 impl Item {
-    fn square_at(&self, budget: f64) -> f64 {
-        self.square * (self.spent / budget).powf(2.0 * self.exponent)
+    /// The square of a part with its exponent, for a budget.
+    fn squares(&self, budget: f64) -> impl Iterator<Item = (f64, f64)> {
+        let ratio = self.spent / budget;
+        let at =
+            move |&(square, exponent): &(f64, f64)| (square * ratio.powf(2.0 * exponent), exponent);
+        self.parts.iter().map(at)
     }
 
-    /// What to spend when a unit of cost must buy `price` of squared error.
+    fn square_at(&self, budget: f64) -> f64 {
+        self.squares(budget).map(|(square, _)| square).sum()
+    }
+
+    /// What to spend when a unit of cost must buy `price` of squared error. What the next unit buys
+    /// falls as more is spent: bisection, in logarithms.
     fn at_price(&self, price: f64) -> f64 {
-        let rate = 2.0 * self.exponent * self.square * self.spent.powf(2.0 * self.exponent);
-        let budget = (rate / (price * self.cost)).powf(1.0 / (2.0 * self.exponent + 1.0));
-        budget.clamp(self.limits[0] as f64, self.limits[1] as f64)
+        let buys = |budget: f64| -> f64 {
+            let squares = self.squares(budget);
+            squares.map(|(square, b)| 2.0 * b * square).sum::<f64>() / budget
+        };
+        let (mut low, mut high) = (self.limits[0] as f64, self.limits[1] as f64);
+        for _ in 0..50 {
+            let middle = (low * high).sqrt();
+            if buys(middle) > price * self.cost {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
     }
 }
 
@@ -215,8 +237,8 @@ mod tests {
 
     fn predicted(budget: Budget) -> f64 {
         let fall = |from: usize, to: usize, b: f64| (from as f64 / to as f64).powf(2.0 * b);
-        ((PARTS.solution.powi(2) + PARTS.mesh.powi(2))
-            * fall(SPENT.patches, budget.patches, PATCH_EXPONENT)
+        (PARTS.solution.powi(2) * fall(SPENT.patches, budget.patches, SOLUTION_EXPONENT)
+            + PARTS.mesh.powi(2) * fall(SPENT.patches, budget.patches, MESH_EXPONENT)
             + PARTS.gather.powi(2) * fall(SPENT.rays, budget.rays, RAY_EXPONENT)
             + PARTS.direct.powi(2) * fall(SPENT.shadow_rays, budget.shadow_rays, SHADOW_EXPONENT))
         .sqrt()
@@ -241,7 +263,7 @@ mod tests {
                     ..best
                 };
                 let at_same_error = predicted(other) / predicted(best);
-                // Cost rises as error^-(1/b), b at least 0.55.
+                // Cost rises as error^-(1/b), b about 0.7.
                 let worth = cost(&other) / cost(&best) * at_same_error.powf(1.0 / 0.7);
                 assert!(worth > 0.99, "{error}: {other:?} is worth {worth}");
             }

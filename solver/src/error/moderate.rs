@@ -12,6 +12,10 @@
 //! and variance of ln(s²_i / v_i). The error over the root of this is a t-variable of d₀ + d degrees of
 //! freedom scaled to unit variance: z² has mean one, and two standard errors cover about 95 %.
 //!
+//! Noise may come in steps: the replicates of a pixel that a lamp's edge grazes all miss the lamp, few
+//! shadow rays all pass. A scatter of exactly zero where noise is expected says so, and nothing of the
+//! noise's size. Such scatters are left out of d₀ and c, and count as the expected c v_i.
+//!
 //! Source: G. K. Smyth, "Linear models and empirical Bayes methods for assessing differential
 //! expression in microarray experiments", Statistical Applications in Genetics and Molecular
 //! Biology 3(1), 2004. Valid for errors near a normal distribution that are independent between
@@ -21,7 +25,7 @@
 const MAX_PRIOR: f64 = 1e3;
 
 /// Scatters below this fraction of the median are counted as this fraction: the logarithm of a
-/// scatter that happens to vanish would outweigh all others. Larger, and true differences are lost.
+/// scatter that happens to be tiny would outweigh all others. Larger, and true differences are lost.
 const FLOOR: f64 = 1e-4;
 
 /// Posterior means of variances from their scatters (unit squared), each of `degrees` of freedom,
@@ -52,7 +56,11 @@ pub fn moderate(scatters: &[f64], expected: &[f64], degrees: u32) -> Vec<f64> {
     scatters
         .iter()
         .zip(expected)
-        .map(|(s, v)| (d0 * c * v + d * s) / (total - 2.0))
+        .map(|(&s, v)| {
+            let usual = c * v;
+            let own = if s > 0.0 { s } else { usual };
+            (d0 * usual + d * own) / (total - 2.0)
+        })
         .collect()
 }
 
@@ -71,15 +79,14 @@ impl Prior {
         let mut ratios: Vec<f64> = scatters
             .iter()
             .zip(expected)
-            .filter(|&(_, &v)| v > 0.0)
+            .filter(|&(&s, &v)| s > 0.0 && v > 0.0)
             .map(|(s, v)| s / v)
             .collect();
-        ratios.sort_unstable_by(f64::total_cmp);
-        let positive = ratios.iter().filter(|&&ratio| ratio > 0.0).count();
-        if positive < FEWEST {
+        if ratios.len() < FEWEST {
             return None;
         }
-        let median = ratios[ratios.len() - positive / 2 - 1];
+        ratios.sort_unstable_by(f64::total_cmp);
+        let median = ratios[ratios.len() / 2];
         let logarithms: Vec<f64> = ratios
             .iter()
             .map(|ratio| ratio.max(FLOOR * median).ln())
@@ -197,6 +204,32 @@ mod tests {
             assert!((mean - 1.0).abs() < 0.1, "mean z² is {mean}");
             assert!((covered - 0.9545).abs() < 0.018, "{covered} are covered");
         }
+    }
+
+    /// Receivers that a rare event changes: σ² = p (1 − p) / n of the fraction p of n rays, which is
+    /// what is expected; with p n = 1/2 most replicates see none.
+    #[test]
+    fn agreement_by_chance_is_no_accuracy() {
+        const RAYS: u64 = 16;
+        const COUNT: u64 = 20_000;
+        let p = 0.5 / RAYS as f64;
+        let fraction = |i: u64, replicate: u64| {
+            let is_hit = |ray| uniform(7, Stage::ROWS, i, replicate * RAYS + ray) < p;
+            (0..RAYS).filter(|&ray| is_hit(ray)).count() as f64 / RAYS as f64
+        };
+        let draws: Vec<[f64; 2]> = (0..COUNT).map(|i| [0, 1].map(|k| fraction(i, k))).collect();
+        let scatters: Vec<f64> = draws.iter().map(|[a, b]| (a - b).powi(2) / 4.0).collect();
+        let moderated = moderate(&scatters, &vec![1.0; COUNT as usize], 1);
+        let z_squares: f64 = draws
+            .iter()
+            .zip(moderated)
+            .map(|([a, b], variance)| (0.5 * (a + b) - p).powi(2) / variance)
+            .sum();
+        // Two thirds of the receivers agree. The scatters that are left are those above zero, larger
+        // than all together by 3/2: the mean of z² is between a half and one. Counted as they are,
+        // zeros would make it infinite; as 1e-4 of the median, some thousands.
+        let mean = z_squares / COUNT as f64;
+        assert!((0.4..1.1).contains(&mean), "mean z² is {mean}");
     }
 
     #[test]

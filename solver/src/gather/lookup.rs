@@ -99,22 +99,21 @@ impl Lookup {
         self.fine.irradiance(patch, distance, self.solutions)
     }
 
-    /// The same at the same point on the coarse mesh; `None` without one, and where a gather into the
-    /// coarse mesh would not look up but go on, being `reach` times nearer than the patch is large.
+    /// The same at the same point on the coarse mesh, with the size of its patch in units; `None` without
+    /// one.
     pub(super) fn coarse_irradiance(
         &self,
         geometry: &Geometry,
         point: SurfacePoint,
         side: Side,
         distance: f32,
-        reach: f32,
-    ) -> Option<&[Vec3]> {
+    ) -> Option<(&[Vec3], f32)> {
         let coarse = self.coarse.as_ref()?;
         let patch = coarse
             .patches
-            .at(geometry, point.triangle, point.u, point.v, side)
-            .filter(|&patch| distance >= reach * coarse.patches.size(patch))?;
-        Some(coarse.irradiance(patch, distance, self.solutions))
+            .at(geometry, point.triangle, point.u, point.v, side)?;
+        let irradiance = coarse.irradiance(patch, distance, self.solutions);
+        Some((irradiance, coarse.patches.size(patch)))
     }
 }
 
