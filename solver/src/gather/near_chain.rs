@@ -232,12 +232,13 @@ impl<'a> Chains<'a> {
             }
             let geometry = surfaces.geometry();
             let patches = lookup.patches();
-            let Some(patch) = patches.at(geometry, point.triangle, point.u, point.v, side) else {
+            let origin = ray.origin.as_dvec3();
+            let Some(patch) = patches.seen_from(geometry, origin, point, side) else {
                 continue;
             };
             if hit.t >= REACH * patches.size(patch) || link == MAX_LINKS {
                 let fine = lookup.irradiance(patch, hit.t);
-                let coarse = lookup.coarse_irradiance(geometry, point, side, hit.t, REACH);
+                let coarse = lookup.coarse_irradiance(geometry, origin, point, side, hit.t, REACH);
                 let range = lookup.range(self.solutions);
                 found.look_up(&mut path, throughput, fine, coarse, range);
             } else {
