@@ -148,10 +148,18 @@ impl Display {
                 let (faces, side) = patches.faces(patch);
                 if borders.len() > MAX_POLYGONS && side == Side::Front {
                     for triangle in faces.iter().flat_map(|&face| geometry.triangles_of(face)) {
-                        let corners = geometry
-                            .triangle(triangle)
-                            .map(|corner| vertex_of[&(nodes.at(corner), patch)]);
-                        triangles.insert(triangle, corners);
+                        let middle = 1.0 / 3.0;
+                        if patches.at(geometry, triangle, middle, middle, side) != Some(patch) {
+                            continue;
+                        }
+                        let [a, b, c] = geometry.triangle(triangle).map(|corner| {
+                            let key = (nodes.find(corner)?, patch);
+                            vertex_of.get(&key).copied()
+                        });
+                        // One that a wall divides has corners in other patches.
+                        if let (Some(a), Some(b), Some(c)) = (a, b, c) {
+                            triangles.insert(triangle, [a, b, c]);
+                        }
                     }
                 }
                 let piece = |(border, has_hanging): &(Vec<u32>, bool)| Piece {
@@ -193,7 +201,8 @@ impl Display {
     }
 
     /// The value at a point of a patch, `position` in the unit frame, interpolated between the
-    /// `values` of vertices; `None` on a degenerate polygon and on the back of a cluster.
+    /// `values` of vertices; `None` on a degenerate polygon, on the back of a cluster and on faces of a
+    /// cluster that walls divide.
     pub fn interpolate(
         &self,
         values: &[Rgb],

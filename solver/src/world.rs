@@ -133,7 +133,12 @@ impl<'s> World<'s> {
         let geometry = self.surfaces.geometry();
         let normal = geometry.normal(geometry.face(triangle));
         let side = Side::facing(ray.direction.as_dvec3(), normal);
-        patches.at(geometry, triangle, f64::from(hit.u), f64::from(hit.v), side)
+        let point = SurfacePoint {
+            triangle,
+            u: f64::from(hit.u),
+            v: f64::from(hit.v),
+        };
+        patches.seen_from(geometry, ray.origin.as_dvec3(), point, side)
     }
 
     /// Receivers from world positions (metres) and normals. A position within rounding of a face

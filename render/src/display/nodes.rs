@@ -69,7 +69,8 @@ impl Nodes {
         self.positions[node]
     }
 
-    fn find(&self, corner: DVec3) -> Option<u32> {
+    /// The node of a corner; `None` when no polygon has it.
+    pub(super) fn find(&self, corner: DVec3) -> Option<u32> {
         keys(corner).find_map(|key| self.by_place.get(&key).copied())
     }
 

@@ -108,14 +108,15 @@ impl<'w> Field<'w> {
         let interaction = &vertex.interaction;
         let point = interaction.point;
         let geometry = world.surfaces().geometry();
-        let Some(patch) =
-            self.patches
-                .at(geometry, point.triangle, point.u, point.v, interaction.side)
+        let position = interaction.receiver.position;
+        let before = position + vertex.view;
+        let Some(patch) = self
+            .patches
+            .seen_from(geometry, before, point, interaction.side)
         else {
             return Rgb::ZERO;
         };
         let values = &self.solutions[replicate as usize % self.solutions.len()];
-        let position = interaction.receiver.position;
         self.display
             .interpolate(&values.at_vertices, patch, point, position)
             .unwrap_or(values.of_patches[patch.index()])

@@ -11,7 +11,7 @@ use crate::geometry::Geometry;
 use crate::patches::{PatchId, Patches, Side};
 use crate::radiosity::{Class, RadiositySolution, unknown};
 use crate::surface::SurfacePoint;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use luxel_scenes::Rgb;
 use std::ops::Range;
 
@@ -104,14 +104,13 @@ impl Lookup {
     pub(super) fn coarse_irradiance(
         &self,
         geometry: &Geometry,
+        origin: DVec3,
         point: SurfacePoint,
         side: Side,
         distance: f32,
     ) -> Option<(&[Vec3], f32)> {
         let coarse = self.coarse.as_ref()?;
-        let patch = coarse
-            .patches
-            .at(geometry, point.triangle, point.u, point.v, side)?;
+        let patch = coarse.patches.seen_from(geometry, origin, point, side)?;
         let irradiance = coarse.irradiance(patch, distance, self.solutions);
         Some((irradiance, coarse.patches.size(patch)))
     }

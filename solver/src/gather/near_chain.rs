@@ -249,14 +249,16 @@ impl<'a> Chains<'a> {
             }
             let geometry = surfaces.geometry();
             let patches = lookup.patches();
-            let Some(patch) = patches.at(geometry, point.triangle, point.u, point.v, side) else {
+            let origin = ray.origin.as_dvec3();
+            let Some(patch) = patches.seen_from(geometry, origin, point, side) else {
                 continue;
             };
             let shown = lookup.irradiance(patch, hit.t);
             let range = lookup.range(self.solutions);
             if hit.t >= REACH * patches.size(patch) || link == MAX_LINKS {
                 found.look_up(&mut path, throughput, shown, range.clone());
-                if let Some((coarse, size)) = lookup.coarse_irradiance(geometry, point, side, hit.t)
+                if let Some((coarse, size)) =
+                    lookup.coarse_irradiance(geometry, origin, point, side, hit.t)
                 {
                     let is_near = hit.t < REACH * size;
                     let weight = if is_near { NEAR_WEIGHT } else { 1.0 };

@@ -78,7 +78,7 @@ pub(super) fn cluster(
 }
 
 /// Lower and upper corner of the box around a face, in the unit frame.
-pub(super) fn bounds(geometry: &Geometry, face: FaceId) -> (DVec3, DVec3) {
+fn bounds(geometry: &Geometry, face: FaceId) -> (DVec3, DVec3) {
     geometry
         .triangles_of(face)
         .flat_map(|triangle| geometry.triangle(triangle))

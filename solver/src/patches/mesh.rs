@@ -1,11 +1,13 @@
 //! The patch mesher: from faces to patches of about one size.
 
+use super::box_tree::bounds_of;
 use super::clipped::Clipped;
-use super::cluster::{self, cluster};
+use super::cluster::cluster;
 use super::density::{self, Density};
 use super::quad_grid::QuadGrid;
 use super::quads;
 use super::region::{Region, Shape};
+use super::separation::separate;
 use super::triangle_grid::TriangleGrid;
 use super::{PatchId, Patches, Side};
 use crate::bvh::Bvh;
@@ -23,7 +25,7 @@ pub enum PatchSize {
     Length(f64),
     /// About this many patches.
     Count(usize),
-    /// One patch for each face of the scene.
+    /// One patch for each face of the scene, or for each part of it that walls on it separate.
     Whole,
     /// One patch for each object of the scene that has faces, in the order of objects, for its
     /// front: what form factors between objects are computed from.
@@ -81,7 +83,10 @@ impl Patches {
             }
             PatchSize::Count(count) => mesher.divide_into(count)?,
         };
-        Ok(assemble(surfaces, regions, size == PatchSize::Objects))
+        if size == PatchSize::Objects {
+            return Ok(assemble(surfaces, regions, true));
+        }
+        Ok(separated(surfaces, bvh, regions))
     }
 
     /// Meshes a scene into about `count` patches, as finely in each place as `density` says: from
@@ -96,7 +101,7 @@ impl Patches {
         density: &Density,
     ) -> Result<Self, MeshError> {
         let regions = Mesher::new(surfaces, bvh, Some(density)).divide_into(count)?;
-        Ok(assemble(surfaces, regions, false))
+        Ok(separated(surfaces, bvh, regions))
     }
 }
 
@@ -115,17 +120,20 @@ impl Patches {
         let mesher = Mesher::new(surfaces, bvh, None);
         let mut regions = Vec::new();
         for old in &self.regions {
-            let is_marked = |element: u32| {
-                marked[(old.first + element) as usize]
-                    || old
-                        .first_back
-                        .is_some_and(|first| marked[(first + element) as usize])
-            };
-            let count = old.element_count();
-            if !(0..count).any(is_marked) {
+            let count = old.shape_count();
+            let mut is_marked = vec![false; count as usize];
+            for element in 0..old.element_count() {
+                let firsts = [Some(old.first), old.first_back];
+                is_marked[old.whole(element) as usize] |= firsts
+                    .into_iter()
+                    .flatten()
+                    .any(|first| marked[(first + element) as usize]);
+            }
+            if !is_marked.contains(&true) {
                 regions.push(old.clone());
                 continue;
             }
+            let is_marked = |element: u32| is_marked[element as usize];
             let shape = match &old.shape {
                 Shape::Quad(quad) => Shape::Quad(quad.refined(is_marked)),
                 Shape::Triangle(triangle) => Shape::Triangle(triangle.refined(is_marked)),
@@ -133,7 +141,7 @@ impl Patches {
                     let area = |wanted: bool| -> f64 {
                         (0..count)
                             .filter(|&element| is_marked(element) || !wanted)
-                            .map(|element| old.element_area(geometry, element))
+                            .map(|element| old.shape_area(geometry, element))
                             .sum()
                     };
                     if area(true) < 0.5 * area(false) {
@@ -144,7 +152,7 @@ impl Patches {
                     }
                 }
                 Shape::Faces { .. } => {
-                    let size = 0.5 * old.element_area(geometry, 0).sqrt();
+                    let size = 0.5 * old.shape_area(geometry, 0).sqrt();
                     let mut faces = old.faces.clone();
                     faces.sort_unstable_by_key(|face| face.index());
                     regions.extend(mesher.divide_faces(&faces, &old.faces, size));
@@ -153,8 +161,14 @@ impl Patches {
             };
             regions.push(region(shape, old.faces.clone()));
         }
-        assemble(surfaces, regions, false)
+        separated(surfaces, bvh, regions)
     }
+}
+
+/// The patches of regions, with their elements divided where walls separate parts of them.
+fn separated(surfaces: &Surfaces, bvh: &Bvh, mut regions: Vec<Region>) -> Patches {
+    separate(surfaces, bvh, &mut regions);
+    assemble(surfaces, regions, false)
 }
 
 /// One region for each object with faces.
@@ -343,6 +357,8 @@ fn region(shape: Shape, faces: Vec<FaceId>) -> Region {
     Region {
         shape,
         faces,
+        cuts: None,
+        is_examined: false,
         first: 0,
         first_back: None,
     }
@@ -400,7 +416,9 @@ fn assemble(surfaces: &Surfaces, mut regions: Vec<Region>, fronts_only: bool) ->
             for element in 0..count {
                 let area = region.element_area(geometry, element);
                 let size = match region.shape {
-                    Shape::Faces { .. } => area.sqrt().max(cluster_extent(geometry, region)),
+                    Shape::Faces { .. } => {
+                        area.sqrt().max(cluster_extent(geometry, region, element))
+                    }
                     _ => area.sqrt(),
                 };
                 let (reflectance, emission) = mean_material(surfaces, region, element, side);
@@ -417,19 +435,12 @@ fn assemble(surfaces: &Surfaces, mut regions: Vec<Region>, fronts_only: bool) ->
     patches
 }
 
-/// Extent of a cluster of several faces; zero for a single face, whose area says it all.
-fn cluster_extent(geometry: &Geometry, region: &Region) -> f64 {
+/// Extent of a patch of a cluster of several faces; zero for a single face, whose area says it all.
+fn cluster_extent(geometry: &Geometry, region: &Region, element: u32) -> f64 {
     if region.faces.len() == 1 {
         return 0.0;
     }
-    let (lower, upper) = region
-        .faces
-        .iter()
-        .map(|&face| cluster::bounds(geometry, face))
-        .fold(
-            (DVec3::INFINITY, DVec3::NEG_INFINITY),
-            |(lower, upper), (l, u)| (lower.min(l), upper.max(u)),
-        );
+    let [lower, upper] = bounds_of(region.polygons(geometry, element).iter().flatten());
     (upper - lower).max_element()
 }
 

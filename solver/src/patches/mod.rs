@@ -4,23 +4,31 @@
 //! parameter space; coplanar pairs of triangles are joined to quads first. Faces that are small
 //! against the patch size are clustered in the order of the ray tree's leaves, so that the number
 //! of patches follows the light and not the triangle count. A hit finds its patch by one lookup:
-//! triangle → region → element. Two-sided faces have a patch for each side.
+//! triangle → region → element. Two-sided faces have a patch for each side. Elements on which walls stand
+//! that light cannot pass are divided along them ([`separation`]), so that no patch lies in two rooms.
 
+mod box_tree;
 mod clipped;
 mod cluster;
+mod cuts;
 mod density;
 mod forest;
 mod mesh;
+mod partition;
+mod plane;
 mod quad_grid;
 mod quads;
 mod region;
+mod separation;
 mod triangle_grid;
+mod walls;
 
 pub use density::Density;
 pub use mesh::{MAX_PATCHES, MeshError, PatchSize};
 pub use region::SurfaceSample;
 
 use crate::geometry::{Geometry, TriangleId};
+use crate::surface::SurfacePoint;
 use glam::DVec3;
 use luxel_scenes::{Exitance, FaceId, Reflectance};
 use region::Region;
@@ -107,7 +115,7 @@ impl Patches {
     }
 
     /// The patch at a point of a triangle (weights u, v of its second and third corner); `None` on
-    /// the back of a one-sided face.
+    /// the back of a one-sided face. At the foot of a wall it may be that of either side.
     pub fn at(
         &self,
         geometry: &Geometry,
@@ -116,12 +124,37 @@ impl Patches {
         v: f64,
         side: Side,
     ) -> Option<PatchId> {
+        self.find(geometry, triangle, [u, v], side, None)
+    }
+
+    /// The patch that a ray sees at a point of a triangle, as [`Patches::at`]; within rounding of the
+    /// foot of a wall that on the side that the ray comes from. `before` is its origin, or any other point of
+    /// its line before the hit, in the unit frame.
+    pub fn seen_from(
+        &self,
+        geometry: &Geometry,
+        before: DVec3,
+        point: SurfacePoint,
+        side: Side,
+    ) -> Option<PatchId> {
+        let weights = [point.u, point.v];
+        self.find(geometry, point.triangle, weights, side, Some(before))
+    }
+
+    fn find(
+        &self,
+        geometry: &Geometry,
+        triangle: TriangleId,
+        [u, v]: [f64; 2],
+        side: Side,
+        seen_from: Option<DVec3>,
+    ) -> Option<PatchId> {
         let region = &self.regions[self.triangle_region[triangle.index()] as usize];
         let first = match side {
             Side::Front => region.first,
             Side::Back => region.first_back?,
         };
-        let element = region.element_at(|| geometry.interpolate(triangle, u, v));
+        let element = region.element_at(|| geometry.interpolate(triangle, u, v), seen_from);
         Some(PatchId(first + element))
     }
 
@@ -156,3 +189,6 @@ impl Patches {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod separation_tests;

@@ -2,6 +2,7 @@
 
 use super::Side;
 use super::clipped::Clipped;
+use super::cuts::{Cuts, Part};
 use super::quad_grid::QuadGrid;
 use super::triangle_grid::TriangleGrid;
 use crate::geometry::{Geometry, ray_origin};
@@ -21,12 +22,16 @@ pub struct SurfaceSample {
     pub face: FaceId,
 }
 
-/// Faces that are meshed together. Its elements are numbered from zero; the patches of its front
-/// start at `first`, those of its back (of two-sided faces) at `first_back`.
+/// Faces that are meshed together. Its elements are numbered from zero: those of its shape, or the first
+/// part of each that walls divide, then the other parts. The patches of its front start at `first`, those of
+/// its back (of two-sided faces) at `first_back`.
 #[derive(Clone, Debug)]
 pub(super) struct Region {
     pub(super) shape: Shape,
     pub(super) faces: Vec<FaceId>,
+    /// The walls across it; `None` without, and before it has been examined.
+    pub(super) cuts: Option<Box<Cuts>>,
+    pub(super) is_examined: bool,
     pub(super) first: u32,
     pub(super) first_back: Option<u32>,
 }
@@ -47,18 +52,23 @@ pub(super) enum Shape {
 /// Area-uniform point of a triangle for a uniform sample; keeps strata connected.
 ///
 /// Source: G. Turk, "Generating Random Points in Triangles", Graphics Gems, 1990.
-fn sample_triangle([a, b, c]: [DVec3; 3], [x, y]: [f64; 2]) -> DVec3 {
+pub(super) fn sample_triangle([a, b, c]: [DVec3; 3], [x, y]: [f64; 2]) -> DVec3 {
     let root = x.sqrt();
     a * (1.0 - root) + b * (root * (1.0 - y)) + c * (root * y)
 }
 
-fn triangle_area([a, b, c]: [DVec3; 3]) -> f64 {
+pub(super) fn triangle_area([a, b, c]: [DVec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
 impl Region {
     /// Elements on one side.
     pub(super) fn element_count(&self) -> u32 {
+        self.shape_count() + self.cuts.as_ref().map_or(0, |cuts| cuts.extra())
+    }
+
+    /// Elements of the shape, whether walls divide them or not.
+    pub(super) fn shape_count(&self) -> u32 {
         match &self.shape {
             Shape::Quad(quad) => quad.forest().len(),
             Shape::Triangle(triangle) => triangle.forest().len(),
@@ -67,8 +77,27 @@ impl Region {
         }
     }
 
-    /// The element at a point, which is computed only where it matters.
-    pub(super) fn element_at(&self, point: impl FnOnce() -> DVec3) -> u32 {
+    /// The element at a point, which is computed only where it matters. Beside a wall it is that on the
+    /// side of `seen_from`.
+    pub(super) fn element_at(
+        &self,
+        point: impl FnOnce() -> DVec3,
+        seen_from: Option<DVec3>,
+    ) -> u32 {
+        match &self.cuts {
+            None => self.shape_at(point),
+            Some(cuts) => cuts.element_at(point(), seen_from, |point| self.shape_at(|| point)),
+        }
+    }
+
+    /// The element of the shape that an element is or is a part of.
+    pub(super) fn whole(&self, element: u32) -> u32 {
+        self.cuts
+            .as_ref()
+            .map_or(element, |cuts| cuts.whole(element))
+    }
+
+    fn shape_at(&self, point: impl FnOnce() -> DVec3) -> u32 {
         match &self.shape {
             Shape::Quad(quad) => quad.element_at(point()),
             Shape::Triangle(triangle) => triangle.element_at(point()),
@@ -85,7 +114,18 @@ impl Region {
         }
     }
 
+    fn part(&self, element: u32) -> Option<&Part> {
+        self.cuts.as_ref()?.part(element)
+    }
+
     pub(super) fn element_area(&self, geometry: &Geometry, element: u32) -> f64 {
+        match self.part(element) {
+            None => self.shape_area(geometry, element),
+            Some(part) => part.area(),
+        }
+    }
+
+    pub(super) fn shape_area(&self, geometry: &Geometry, element: u32) -> f64 {
         match &self.shape {
             Shape::Quad(quad) => {
                 let [a, b, c, d] = quad.cell(element);
@@ -105,6 +145,13 @@ impl Region {
     }
 
     pub(super) fn polygons(&self, geometry: &Geometry, element: u32) -> Vec<Vec<DVec3>> {
+        match self.part(element) {
+            None => self.shape_polygons(geometry, element),
+            Some(part) => part.polygons.clone(),
+        }
+    }
+
+    pub(super) fn shape_polygons(&self, geometry: &Geometry, element: u32) -> Vec<Vec<DVec3>> {
         match &self.shape {
             Shape::Quad(quad) => vec![quad.cell(element).to_vec()],
             Shape::Triangle(triangle) => vec![triangle.cell(element).to_vec()],
@@ -122,8 +169,53 @@ impl Region {
         geometry: &Geometry,
         element: u32,
         side: Side,
-        [mut x, y]: [f64; 2],
+        sample: [f64; 2],
     ) -> SurfaceSample {
+        let (face, position) = match &self.cuts {
+            None => self.shape_sample(geometry, element, sample),
+            Some(cuts) => {
+                let at = |[x, y]: [f64; 2]| match cuts.part(element) {
+                    None => self.shape_sample(geometry, element, [x, y]),
+                    Some(part) => {
+                        let (face, corners, x) = part.triangle(x);
+                        (face, sample_triangle(corners, [x, y]))
+                    }
+                };
+                let (face, position) = at(sample);
+                // No point of a part that is wider than the guard of its walls is nearer to them than the
+                // middle of a triangle.
+                let middle = match cuts.part(element) {
+                    None => self.middle(geometry, element),
+                    Some(part) => part.middle(sample[0]),
+                };
+                (face, cuts.kept_off(element, position, middle))
+            }
+        };
+        let front = geometry.normal(face);
+        let normal = if side == Side::Front { front } else { -front };
+        let origin = ray_origin(position, normal, geometry.extent(face));
+        SurfaceSample {
+            position,
+            normal,
+            origin,
+            face,
+        }
+    }
+
+    /// The mean of the corners of an element of the shape.
+    fn middle(&self, geometry: &Geometry, element: u32) -> DVec3 {
+        let polygons = self.shape_polygons(geometry, element);
+        let corners = || polygons.iter().flatten();
+        corners().sum::<DVec3>() / corners().count() as f64
+    }
+
+    /// A point of an element of the shape, and its face.
+    fn shape_sample(
+        &self,
+        geometry: &Geometry,
+        element: u32,
+        [mut x, y]: [f64; 2],
+    ) -> (FaceId, DVec3) {
         let mut face = self.faces[0];
         let position = match &self.shape {
             Shape::Quad(quad) => {
@@ -159,20 +251,12 @@ impl Region {
                 sample_fan(triangles, [x, y])
             }
         };
-        let front = geometry.normal(face);
-        let normal = if side == Side::Front { front } else { -front };
-        let origin = ray_origin(position, normal, geometry.extent(face));
-        SurfaceSample {
-            position,
-            normal,
-            origin,
-            face,
-        }
+        (face, position)
     }
 }
 
 /// The triangles of a convex polygon.
-fn fan(polygon: &[DVec3]) -> impl Iterator<Item = [DVec3; 3]> + Clone + '_ {
+pub(super) fn fan(polygon: &[DVec3]) -> impl Iterator<Item = [DVec3; 3]> + Clone + '_ {
     polygon[1..]
         .windows(2)
         .map(|pair| [polygon[0], pair[0], pair[1]])
