@@ -3,95 +3,60 @@
 //! A pixel holds the means of a few independent replicates, each a low-discrepancy set with a
 //! scramble of its own (and, where light is looked up in a mesh, with a solution of its own): the
 //! scatter s² = Σ (x_r − x̄)² / (R (R − 1)) is the variance of their mean, which the samples of a set
-//! among themselves would not tell. It is moderated by the neighbours' ([`moderate`]). Films take
-//! further samples, of the same sequences, until the error suits. Cost: 144 bytes a pixel.
-//!
-//! [`Moments`] are Welford's recurrences for a single receiver: mean μ and m₂ = Σ (x − μ)². Source:
-//! B. P. Welford, "Note on a method for calculating corrected sums of squares and products",
-//! Technometrics 4(3), 1962.
+//! among themselves would not tell. What the neighbours say of it stands in `noise`. Films take
+//! further samples, of the same sequences, each pixel as many as it needs (`allocation`), until the
+//! error suits. Cost: 148 bytes a pixel.
+
+mod allocation;
+mod moments;
+mod noise;
+
+pub use moments::Moments;
 
 use crate::image::Image;
-use crate::integrators::Seen;
+use crate::integrators::{SampleKey, Seen};
 use glam::Vec3;
 use luxel_scenes::Rgb;
 use luxel_solver::error::{discretisation, moderate};
 use luxel_solver::gather::MAX_REPLICATES;
 use rayon::prelude::*;
 
-/// Pixels that one task computes together: enough rays for a batch, few enough that a small
-/// picture still feeds every thread.
-const PIXELS_PER_TASK: usize = 512;
-
-/// Receivers of a film of one row that one task computes together: they get many samples each.
-const RECEIVERS_PER_TASK: usize = 16;
-
-/// Running mean and variance of independent values, per channel.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Moments {
-    count: u32,
-    mean: Rgb,
-    squares: Rgb,
-}
-
-impl Moments {
-    /// Takes in one more value.
-    pub fn add(&mut self, value: Rgb) {
-        self.count += 1;
-        let delta = value - self.mean;
-        self.mean += delta / f64::from(self.count);
-        self.squares += delta * (value - self.mean);
-    }
-
-    /// How many values there are.
-    pub fn count(&self) -> u32 {
-        self.count
-    }
-
-    /// Their mean, in the unit of the values; zero without any.
-    pub fn mean(&self) -> Rgb {
-        self.mean
-    }
-
-    /// Their unbiased sample variance, in the unit of the values squared; `None` for fewer than
-    /// two values.
-    pub fn variance(&self) -> Option<Rgb> {
-        (self.count > 1).then(|| self.squares / f64::from(self.count - 1))
-    }
-
-    /// The standard error of the mean, in the unit of the values; `None` for fewer than two.
-    pub fn standard_error(&self) -> Option<Rgb> {
-        let variance = self.variance()? / f64::from(self.count);
-        Some(Rgb::new(
-            variance.x.sqrt(),
-            variance.y.sqrt(),
-            variance.z.sqrt(),
-        ))
-    }
-}
+/// Samples of a replicate that one call computes together: enough rays for a batch, few enough that a
+/// small picture still feeds every thread.
+const BATCH: usize = 512;
 
 /// The replicates of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Pixel {
+struct Pixel {
+    /// Samples of each replicate.
+    samples: u32,
     /// Mean of the samples of each replicate.
     means: [Rgb; MAX_REPLICATES],
     /// Mean differences from a coarser mesh. Single precision: they are estimates of an error.
     differences: [Vec3; MAX_REPLICATES],
 }
 
-/// Sums over new samples of a pixel, by replicate.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Exposure {
-    sums: [Seen; MAX_REPLICATES],
+impl Pixel {
+    /// Takes in the sums of `further` samples of each replicate.
+    fn add(&mut self, sums: &[Seen; MAX_REPLICATES], further: u32) {
+        let total = f64::from(self.samples + further);
+        let (old, new) = (f64::from(self.samples) / total, 1.0 / total);
+        for (r, seen) in sums.iter().enumerate() {
+            self.means[r] = self.means[r] * old + seen.value * new;
+            let difference = seen.mesh_difference * new;
+            self.differences[r] = self.differences[r] * old as f32 + difference.as_vec3();
+        }
+        self.samples += further;
+    }
 }
 
-impl Exposure {
-    /// Takes in one more sample of a replicate.
-    ///
-    /// # Panics
-    /// When `replicate` is not below [`MAX_REPLICATES`].
-    pub fn add(&mut self, replicate: u32, seen: Seen) {
-        self.sums[replicate as usize] += seen;
-    }
+/// A sample to take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Due {
+    /// Index of the pixel.
+    pub pixel: usize,
+    /// Where its random numbers come from.
+    pub key: SampleKey,
 }
 
 /// Pixels in row-major order, row 0 at the top: or any other receivers, in one row.
@@ -99,9 +64,18 @@ impl Exposure {
 pub struct Film {
     size: [usize; 2],
     replicates: u32,
-    /// Samples of each replicate of every pixel.
-    samples: u32,
     pixels: Vec<Pixel>,
+}
+
+/// How many samples the pixels of a film hold, all replicates together.
+#[derive(Clone, Copy, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct SampleCounts {
+    /// Mean over the pixels.
+    pub mean: f64,
+    /// Of the pixel with the fewest.
+    pub min: u32,
+    /// Of the pixel with the most.
+    pub max: u32,
 }
 
 /// Relative error of a film, rms over mean.
@@ -123,9 +97,9 @@ impl FilmError {
 /// How the noise of a pixel can be guessed from other pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Alike {
-    /// Neighbours are about equally noisy.
+    /// Neighbours are about equally noisy, but for edges between them.
     Neighbours,
-    /// All are about equally noisy relative to their values.
+    /// All are about equally noisy relative to their values. Pixels hold equally many samples.
     Values,
     /// The values are the fractions of this many rays that are unblocked: binomial, and uncertain even
     /// where all rays agree, (p n + 1)/(n + 2) of them (P.-S. Laplace's rule of succession, 1774).
@@ -164,7 +138,6 @@ impl Film {
         Self {
             size,
             replicates,
-            samples: 0,
             pixels: vec![Pixel::default(); size[0] * size[1]],
         }
     }
@@ -179,39 +152,97 @@ impl Film {
         self.replicates
     }
 
-    /// Samples of each replicate of every pixel so far.
-    pub fn samples(&self) -> u32 {
-        self.samples
+    /// Samples of every pixel so far, all replicates together.
+    pub fn samples(&self) -> impl Iterator<Item = u32> {
+        let replicates = self.replicates;
+        self.pixels
+            .iter()
+            .map(move |pixel| pixel.samples * replicates)
     }
 
-    /// Lets `expose` add `samples` samples to every replicate of all pixels, in parallel,
-    /// some consecutive pixels a call: it gets the index of the first one and their
-    /// exposures. Every pixel belongs to one call, so that the result does not depend on the number
-    /// of threads when `expose` is a function of its arguments.
-    pub fn expose(&mut self, samples: u32, expose: impl Fn(usize, &mut [Exposure]) + Sync) {
-        let total = f64::from(self.samples + samples);
-        let (old, new) = (f64::from(self.samples) / total, 1.0 / total);
-        let task_size = if self.size[1] == 1 {
-            RECEIVERS_PER_TASK
-        } else {
-            PIXELS_PER_TASK
-        };
-        self.pixels
-            .par_chunks_mut(task_size)
-            .enumerate()
-            .for_each(|(task, pixels)| {
-                let mut exposures = vec![Exposure::default(); pixels.len()];
-                expose(task * task_size, &mut exposures);
-                for (pixel, exposure) in pixels.iter_mut().zip(&exposures) {
-                    for (r, seen) in exposure.sums.iter().enumerate() {
-                        pixel.means[r] = pixel.means[r] * old + seen.value * new;
-                        let difference = seen.mesh_difference * new;
-                        pixel.differences[r] =
-                            pixel.differences[r] * old as f32 + difference.as_vec3();
-                    }
+    /// Mean and range of [`Film::samples`]; zero for a film without pixels.
+    pub fn sample_counts(&self) -> SampleCounts {
+        let total: u64 = self.samples().map(u64::from).sum();
+        SampleCounts {
+            mean: total as f64 / self.pixels.len().max(1) as f64,
+            min: self.samples().min().unwrap_or(0),
+            max: self.samples().max().unwrap_or(0),
+        }
+    }
+
+    /// Samples of all replicates together when each takes `further`.
+    pub fn cost(&self, further: &[u32]) -> u64 {
+        let sum: u64 = further.iter().copied().map(u64::from).sum();
+        sum * u64::from(self.replicates)
+    }
+
+    /// As many samples for each replicate of every pixel.
+    pub fn evenly(&self, samples: u32) -> Vec<u32> {
+        vec![samples; self.pixels.len()]
+    }
+
+    /// Samples for each replicate of every pixel that divide the variance of the whole film by
+    /// `reduction`, at least cost, as far as its noise is known. No pixel's are more than quadrupled.
+    pub fn where_noisy(&self, reduction: f64) -> Vec<u32> {
+        let noise = [0, 1, 2].map(|channel| self.channel(channel).variances());
+        let of_pixel = |pixel| (0..3).map(|channel| noise[channel][pixel]).sum();
+        let variances: Vec<f64> = (0..self.pixels.len()).map(of_pixel).collect();
+        let samples: Vec<u32> = self.pixels.iter().map(|pixel| pixel.samples).collect();
+        allocation::further(&variances, &samples, reduction)
+    }
+
+    /// Takes `further` samples for each replicate of every pixel, in parallel. `see` writes what is
+    /// seen by some samples, all of one replicate. The result does not depend on the number of threads
+    /// when what a sample sees depends on the sample alone: every pixel belongs to one task.
+    ///
+    /// # Panics
+    /// When `further` has not one number for each pixel.
+    pub fn expose(&mut self, further: &[u32], see: impl Fn(&[Due], &mut [Seen]) + Sync) {
+        assert_eq!(further.len(), self.pixels.len(), "a number a pixel");
+        let replicates = self.replicates;
+        let mut tasks = Vec::new();
+        let mut pixels = self.pixels.as_mut_slice();
+        let (mut first, mut end, mut samples) = (0, 0, 0);
+        for &more in further {
+            end += 1;
+            samples += more as usize;
+            if samples >= BATCH || end == further.len() {
+                let (task, rest) = std::mem::take(&mut pixels).split_at_mut(end - first);
+                tasks.push((first, task, &further[first..end]));
+                (pixels, first, samples) = (rest, end, 0);
+            }
+        }
+        tasks.into_par_iter().for_each(|(first, pixels, further)| {
+            let mut sums = vec![[Seen::default(); MAX_REPLICATES]; pixels.len()];
+            for replicate in 0..replicates {
+                let due =
+                    pixels
+                        .iter()
+                        .zip(further)
+                        .enumerate()
+                        .flat_map(|(slot, (pixel, &further))| {
+                            let pixels = (first + slot) as u64 * u64::from(replicates);
+                            let key = move |index| SampleKey {
+                                item: pixels + u64::from(replicate),
+                                replicate,
+                                index,
+                            };
+                            let indices = pixel.samples..pixel.samples + further;
+                            indices.map(move |index| Due {
+                                pixel: first + slot,
+                                key: key(index),
+                            })
+                        });
+                take(due, &see, |due, seen| {
+                    sums[due.pixel - first][replicate as usize] += seen;
+                });
+            }
+            for ((pixel, sums), &further) in pixels.iter_mut().zip(&sums).zip(further) {
+                if further > 0 {
+                    pixel.add(sums, further);
                 }
-            });
-        self.samples += samples;
+            }
+        });
     }
 
     /// The value of each pixel.
@@ -228,7 +259,7 @@ impl Film {
     }
 
     /// The errors of all pixels; `None` for a film of one replicate, which does not know them.
-    /// Noise is [moderated](moderate) by what is `alike`.
+    /// Noise is told by what is `alike`.
     pub fn errors(&self, alike: Alike) -> Option<Vec<PixelError>> {
         if self.replicates < 2 {
             return None;
@@ -236,14 +267,14 @@ impl Film {
         let values: Vec<Rgb> = self.values().collect();
         let mut errors = vec![PixelError::default(); values.len()];
         for channel in 0..3 {
-            let scatters = self.scatters(channel);
             let levels: Vec<f64> = values.iter().map(|value| value[channel].powi(2)).collect();
-            let expected = match alike {
-                Alike::Values => levels.clone(),
-                Alike::Fractions { rays } => fractions(&values, channel, rays),
-                Alike::Neighbours => self.neighbourhood(&scatters),
+            let moderated =
+                |expected: &[f64]| moderate(&self.scatters(channel), expected, self.replicates - 1);
+            let sampling = match alike {
+                Alike::Neighbours => self.channel(channel).variances(),
+                Alike::Fractions { rays } => moderated(&fractions(&values, channel, rays)),
+                Alike::Values => moderated(&levels),
             };
-            let sampling = moderate(&scatters, &expected, self.replicates - 1);
             let discretisation = discretisation(&self.differences(channel), &levels);
             for (index, error) in errors.iter_mut().enumerate() {
                 error.sampling[channel] = sampling[index].sqrt();
@@ -253,9 +284,8 @@ impl Film {
         Some(errors)
     }
 
-    /// Relative errors of all pixels together, rms over mean; zero for a film of one replicate. The
-    /// scatters are averaged as they are: their mean is unbiased.
-    pub fn relative_error(&self) -> FilmError {
+    /// Relative errors of all pixels together, rms over mean; zero for a film of one replicate.
+    pub fn relative_error(&self, alike: Alike) -> FilmError {
         if self.replicates < 2 {
             return FilmError::default();
         }
@@ -264,7 +294,11 @@ impl Film {
             let values: Vec<f64> = self.values().map(|value| value[channel]).collect();
             let levels: Vec<f64> = values.iter().map(|value| value * value).collect();
             level += values.iter().sum::<f64>();
-            noise += self.scatters(channel).iter().sum::<f64>();
+            noise += match alike {
+                Alike::Neighbours => self.channel(channel).total(),
+                // Where pixels hold equally many samples, the mean of their scatters is unbiased.
+                _ => self.scatters(channel).iter().sum::<f64>(),
+            };
             mesh += discretisation(&self.differences(channel), &levels)
                 .iter()
                 .sum::<f64>();
@@ -280,6 +314,17 @@ impl Film {
         FilmError {
             sampling: relative(noise),
             discretisation: relative(mesh),
+        }
+    }
+
+    /// A channel, for what pixels and their neighbours tell of its noise.
+    fn channel(&self, channel: usize) -> noise::Channel {
+        noise::Channel {
+            size: self.size,
+            samples: self.samples().collect(),
+            values: self.values().map(|value| value[channel]).collect(),
+            scatters: self.scatters(channel),
+            degrees: self.replicates - 1,
         }
     }
 
@@ -322,30 +367,28 @@ impl Film {
         let squares: f64 = values.map(|value| (value - mean).powi(2)).sum();
         squares / (count * (count - 1.0))
     }
+}
 
-    /// The mean over the up to eight neighbours of each pixel.
-    fn neighbourhood(&self, scatters: &[f64]) -> Vec<f64> {
-        let [width, height] = self.size;
-        (0..scatters.len())
-            .into_par_iter()
-            .map(|index| {
-                let (x, y) = (index % width, index / width);
-                let (mut sum, mut count) = (0.0, 0.0);
-                for row in y.saturating_sub(1)..(y + 2).min(height) {
-                    for column in x.saturating_sub(1)..(x + 2).min(width) {
-                        if (column, row) != (x, y) {
-                            sum += scatters[row * width + column];
-                            count += 1.0;
-                        }
-                    }
-                }
-                if count > 0.0 {
-                    sum / count
-                } else {
-                    scatters[index]
-                }
-            })
-            .collect()
+/// Lets `see` take samples, a batch at a time, and hands each with what it saw to `add`, in order.
+fn take(
+    mut due: impl Iterator<Item = Due>,
+    see: impl Fn(&[Due], &mut [Seen]),
+    mut add: impl FnMut(Due, Seen),
+) {
+    let mut batch = Vec::with_capacity(BATCH);
+    let mut seen = Vec::with_capacity(BATCH);
+    loop {
+        batch.clear();
+        batch.extend(due.by_ref().take(BATCH));
+        if batch.is_empty() {
+            return;
+        }
+        seen.clear();
+        seen.resize(batch.len(), Seen::default());
+        see(&batch, &mut seen);
+        for (&due, &seen) in batch.iter().zip(&seen) {
+            add(due, seen);
+        }
     }
 }
 
@@ -368,109 +411,4 @@ fn image([width, height]: [usize; 2], values: impl Iterator<Item = Rgb>) -> Imag
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use luxel_solver::sampling::Stage;
-    use luxel_solver::sampling::hash::uniform;
-
-    /// A uniform integer in 0..n from Weyl's sequence: equidistributed, so that the moments of
-    /// many of them approach those of the uniform distribution.
-    fn weyl(i: u32) -> f64 {
-        (f64::from(i) * 0.618_033_988_749_894_9).fract()
-    }
-
-    #[test]
-    fn moments_of_the_uniform_distribution() {
-        let n = 100_000;
-        let mut moments = Moments::default();
-        for i in 0..n {
-            // A large offset: the naive sum of squares would lose six of its digits here.
-            moments.add(Rgb::splat(1e5 + weyl(i)));
-        }
-        let variance = moments.variance().expect("many values").x;
-        // Weyl's discrepancy is O(log n / n), about 1e-4 here; variance of [0, 1) is 1/12.
-        assert!((moments.mean().x - 1e5 - 0.5).abs() < 2e-4, "mean");
-        assert!((variance - 1.0 / 12.0).abs() < 2e-4, "variance");
-        let error = moments.standard_error().expect("many values").x;
-        assert!((error - (variance / f64::from(n)).sqrt()).abs() < 1e-12);
-    }
-
-    #[test]
-    fn few_values_have_no_variance() {
-        let mut moments = Moments::default();
-        assert_eq!((moments.mean(), moments.variance()), (Rgb::ZERO, None));
-        moments.add(Rgb::ONE);
-        assert_eq!((moments.mean(), moments.variance()), (Rgb::ONE, None));
-        moments.add(Rgb::splat(3.0));
-        assert_eq!(moments.variance(), Some(Rgb::splat(2.0)));
-        assert_eq!(moments.standard_error(), Some(Rgb::ONE));
-    }
-
-    #[test]
-    fn every_pixel_is_exposed_once_whatever_the_threads() {
-        let expose = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .expect("a pool of threads");
-            let mut film = Film::new([37, 41], 2);
-            pool.install(|| {
-                film.expose(1, |first, pixels| {
-                    for (i, pixel) in pixels.iter_mut().enumerate() {
-                        pixel.add(0, Rgb::splat((first + i) as f64).into());
-                        pixel.add(1, Rgb::splat(weyl((first + i) as u32)).into());
-                    }
-                });
-            });
-            film
-        };
-        let film = expose(1);
-        assert_eq!(film, expose(3));
-        for (i, value) in film.values().enumerate() {
-            let expected = f64::midpoint(i as f64, weyl(i as u32));
-            assert!((value.x - expected).abs() < 1e-12, "pixel {i}");
-        }
-    }
-
-    #[test]
-    fn further_samples_weigh_as_much_as_the_first() {
-        let mut film = Film::new([1, 1], 1);
-        let add = |film: &mut Film, samples: u32, value: f64| {
-            film.expose(samples, |_, pixels| {
-                for _ in 0..samples {
-                    pixels[0].add(0, Rgb::splat(value).into());
-                }
-            });
-        };
-        add(&mut film, 1, 4.0);
-        add(&mut film, 3, 8.0);
-        assert_eq!(film.values().next(), Some(Rgb::splat(7.0)));
-        assert_eq!((film.samples(), film.errors(Alike::Neighbours)), (4, None));
-    }
-
-    /// Independent uniform noise of standard deviation σ = 1/√12 in each of four replicates: the
-    /// stated error is that of their mean, σ/2, and the mean over pixels of z² is one.
-    #[test]
-    fn noise_is_stated_as_it_is() {
-        let mut film = Film::new([64, 64], 4);
-        film.expose(1, |first, pixels| {
-            for (i, pixel) in pixels.iter_mut().enumerate() {
-                for replicate in 0..4 {
-                    let item = (first + i) as u64;
-                    let noise = uniform(1, Stage::CAMERA, item, u64::from(replicate));
-                    pixel.add(replicate, Rgb::splat(noise).into());
-                }
-            }
-        });
-        let errors = film.errors(Alike::Neighbours).expect("four replicates");
-        let z_squares: f64 = film
-            .values()
-            .zip(&errors)
-            .map(|(value, error)| ((value.x - 0.5) / error.sampling.x).powi(2))
-            .sum();
-        // Of 4096 values of z², whose standard deviation is about √2, the mean is known to 0.022.
-        let mean = z_squares / 4096.0;
-        assert!((mean - 1.0).abs() < 0.1, "{mean}");
-        assert!(errors.iter().all(|error| error.discretisation == Rgb::ZERO));
-    }
-}
+mod tests;

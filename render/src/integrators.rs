@@ -14,7 +14,7 @@ mod vertex;
 pub mod whitted;
 
 use crate::camera::{CameraFrame, CameraRay};
-use crate::film::Film;
+use crate::film::{Due, Film};
 use crate::progress::Progress;
 use glam::DVec2;
 use luxel_scenes::Rgb;
@@ -110,15 +110,13 @@ pub trait Integrator: Sync {
     fn estimate(&self, rays: &[CameraRay], keys: &[SampleKey], seen: &mut [Seen]);
 }
 
-/// Which camera samples of every pixel to take.
+/// Which camera samples to take of every pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Samples {
     /// Independent replicates, from one to [`MAX_REPLICATES`]; from two on the film knows its
     /// standard error.
     pub replicates: u32,
-    /// Samples of each replicate that the film holds already.
-    pub before: u32,
-    /// Samples of each replicate to add, at least one; powers of two fill the pixel best.
+    /// Samples of each replicate, at least one; powers of two fill the pixel best.
     pub per_replicate: u32,
     /// Seed of all randomness.
     pub seed: u64,
@@ -135,20 +133,14 @@ impl Samples {
             .unwrap_or(1);
         Self {
             replicates,
-            before: 0,
             per_replicate: (total / replicates).max(1),
             seed,
         }
     }
-
-    /// Samples of a pixel after these.
-    pub fn total(&self) -> u32 {
-        self.replicates * (self.before + self.per_replicate)
-    }
 }
 
 /// Exposes a film of the camera's size: box filter. The same bytes at any number of threads.
-/// Progress counts pixels.
+/// Progress counts samples.
 pub fn expose(
     integrator: &dyn Integrator,
     camera: &CameraFrame,
@@ -156,54 +148,45 @@ pub fn expose(
     progress: &dyn Progress,
 ) -> Film {
     let mut film = Film::new(camera.size(), samples.replicates);
-    expose_further(&mut film, integrator, camera, samples, progress);
+    let further = film.evenly(samples.per_replicate);
+    expose_further(
+        &mut film,
+        integrator,
+        camera,
+        samples.seed,
+        &further,
+        progress,
+    );
     film
 }
 
-/// Adds samples to a film. What `samples.before` says must be what the film holds: the sequences go
-/// on from there.
+/// Adds `further` samples to each replicate of every pixel of a film, with the random numbers of
+/// `seed`: the sequences go on from where each pixel's stand. Progress counts samples.
 ///
 /// # Panics
-/// When the film's size or replicates differ.
+/// When the film's size differs from the camera's, or `further` has not one number for each pixel.
 pub fn expose_further(
     film: &mut Film,
     integrator: &dyn Integrator,
     camera: &CameraFrame,
-    samples: Samples,
+    seed: u64,
+    further: &[u32],
     progress: &dyn Progress,
 ) {
     let [width, height] = camera.size();
     assert_eq!(film.size(), [width, height], "the film fits the camera");
-    assert_eq!(film.replicates(), samples.replicates, "as many replicates");
-    progress.start("rendering", (width * height) as u64);
-    film.expose(samples.per_replicate, |first, pixels| {
-        let count = pixels.len();
-        let mut seen = vec![Seen::default(); count];
-        let mut rays = Vec::with_capacity(count);
-        let mut keys = Vec::with_capacity(count);
-        for replicate in 0..samples.replicates {
-            for index in samples.before..samples.before + samples.per_replicate {
-                rays.clear();
-                keys.clear();
-                for pixel in first..first + count {
-                    let item = pixel as u64 * u64::from(samples.replicates) + u64::from(replicate);
-                    let sequence = Sequence::new(samples.seed, Stage::CAMERA, item);
-                    let corner = DVec2::new((pixel % width) as f64, (pixel / width) as f64);
-                    let jitter = DVec2::from_array(sequence.point2(index));
-                    rays.push(camera.ray(corner + jitter));
-                    keys.push(SampleKey {
-                        item,
-                        replicate,
-                        index,
-                    });
-                }
-                integrator.estimate(&rays, &keys, &mut seen);
-                for (pixel, seen) in pixels.iter_mut().zip(&seen) {
-                    pixel.add(replicate, *seen);
-                }
-            }
-        }
-        progress.advance(count as u64);
+    progress.start("rendering", film.cost(further));
+    film.expose(further, |due, seen| {
+        let ray = |due: &Due| {
+            let sequence = Sequence::new(seed, Stage::CAMERA, due.key.item);
+            let corner = DVec2::new((due.pixel % width) as f64, (due.pixel / width) as f64);
+            let jitter = DVec2::from_array(sequence.point2(due.key.index));
+            camera.ray(corner + jitter)
+        };
+        let rays: Vec<CameraRay> = due.iter().map(ray).collect();
+        let keys: Vec<SampleKey> = due.iter().map(|due| due.key).collect();
+        integrator.estimate(&rays, &keys, seen);
+        progress.advance(due.len() as u64);
     });
     progress.finish();
 }

@@ -1,5 +1,6 @@
 //! Stated errors against true ones: what `tests/ACCURACY.md` shows at length, on a few seeds.
 
+use luxel_tests::accuracy::noise::Spread;
 use luxel_tests::accuracy::scenes::{Summary, reference};
 use luxel_tests::accuracy::{Calibration, exact, noise};
 use luxel_tests::cases::{ambient_occlusion, irradiance_fields};
@@ -79,5 +80,25 @@ fn noise_scatters_as_much_as_it_says() {
             (0.8..=1.25).contains(&mean),
             "{name}: the mean of z² is {mean}"
         );
+    }
+}
+
+/// The pixels of a film, an edge of the lamp in view, whose samples are spread evenly or where the
+/// noise is: the same bounds, and the error of whole films, which is that of a few edge pixels, is not
+/// above what they state by more than their scatter, a quarter of the square. The means of both kinds
+/// agree: sampling that ends where replicates agree by chance would be biased.
+#[test]
+fn pixels_scatter_as_much_as_they_say() {
+    let pixels = |spread| noise::pixels(NOISE_SEEDS, spread);
+    let even = [16, 64].map(|samples| pixels(Spread::Even(samples)));
+    let spread = [1, 3].map(|rounds| pixels(Spread::WhereNoisy { rounds }));
+    for found in even.iter().chain(&spread) {
+        assert!((0.8..=1.25).contains(&found.z_squared), "{found:?}");
+        assert!(found.variance_ratio < 1.25, "{found:?}");
+    }
+    for found in &spread {
+        let sigma = found.standard_error.hypot(even[1].standard_error);
+        let bias = found.mean - even[1].mean;
+        assert!(bias.abs() < 4.0 * sigma, "{bias} ± {sigma}, {found:?}");
     }
 }

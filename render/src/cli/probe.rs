@@ -225,7 +225,7 @@ impl Probe {
                 seed,
             };
             let occlusion = AmbientOcclusion::new(world, config);
-            let add = |film: &mut Film, samples: u32, progress: &dyn Progress| {
+            let add = |film: &mut Film, samples: &[u32], progress: &dyn Progress| {
                 occlusion.at_receivers(film, receivers, samples, progress);
             };
             return Ok(self.sample(receivers.len(), AO_RAYS, goal, context, add));
@@ -235,7 +235,7 @@ impl Probe {
         match self.integrator.unwrap_or(Method::Gather) {
             Method::Path => {
                 let tracer = PathTracer::new(world, seed);
-                let add = |film: &mut Film, samples: u32, progress: &dyn Progress| {
+                let add = |film: &mut Film, samples: &[u32], progress: &dyn Progress| {
                     tracer.irradiance(film, receivers, components, samples, progress);
                 };
                 Ok(self.sample(receivers.len(), 1, goal, context, add))
@@ -251,15 +251,15 @@ impl Probe {
         rays: u32,
         goal: Option<&Goal>,
         context: &Context<'_>,
-        add: impl FnMut(&mut Film, u32, &dyn Progress),
+        add: impl FnMut(&mut Film, &[u32], &dyn Progress),
     ) -> Option<Found> {
         let mut steering = Steering::new(context, goal);
         let mut film = Film::new([receivers, 1], REPLICATES);
         let fewest = adaptive::fewest_rays(receivers) as u32;
         let each = |all: u32| (all / (REPLICATES * rays)).max(1);
         let first = self.rays.map_or(each(fewest).max(FIRST_SAMPLES), each);
-        let error = refine(&mut film, first, goal, &mut steering, add)?;
-        let all_rays = film.samples() * REPLICATES * rays;
+        let error = refine(&mut film, first, Alike::Values, goal, &mut steering, add)?;
+        let all_rays = film.sample_counts().max * rays;
         let alike = match self.quantity {
             Quantity::Ao => Alike::Fractions { rays: all_rays },
             Quantity::Irradiance => Alike::Values,

@@ -119,12 +119,9 @@ impl<'a, 'r> Steering<'a, 'r> {
                     .is_some_and(|goal| goal.time_left() == Some(Duration::ZERO)))
     }
 
-    /// Progress of `samples` samples at every receiver, as part of what was started.
-    pub(super) fn per_receiver(&self, samples: u32) -> PerReceiver<'a, 'r> {
-        PerReceiver {
-            reporter: self.reporter,
-            samples: u64::from(samples),
-        }
+    /// Progress of a piece of what was started.
+    pub(super) fn piece(&self) -> Piece<'a, 'r> {
+        Piece(self.reporter)
     }
 
     /// A complete result has this relative error. True when it suits.
@@ -165,17 +162,14 @@ impl Control for Steering<'_, '_> {
     }
 }
 
-/// Progress that counts receivers, of a stage that counts samples of receivers.
-pub(super) struct PerReceiver<'a, 'r> {
-    reporter: &'a Reporter<'r>,
-    samples: u64,
-}
+/// Progress of a piece of a stage, which neither begins nor ends it.
+pub(super) struct Piece<'a, 'r>(&'a Reporter<'r>);
 
-impl Progress for PerReceiver<'_, '_> {
+impl Progress for Piece<'_, '_> {
     fn start(&self, _stage: &str, _total: u64) {}
 
-    fn advance(&self, receivers: u64) {
-        self.reporter.advance(receivers * self.samples);
+    fn advance(&self, samples: u64) {
+        self.0.advance(samples);
     }
 
     fn finish(&self) {}

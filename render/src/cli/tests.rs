@@ -234,8 +234,12 @@ fn every_integrator_writes_a_picture_of_the_furnace() {
         assert_eq!((picture.image.width, picture.image.height), (8, 6));
         let origin = picture.origin.expect("luxel says where a picture is from");
         assert_eq!(
-            (origin.integrator.as_str(), origin.samples),
-            (integrator, 16)
+            (
+                origin.integrator.as_str(),
+                origin.samples.min,
+                origin.samples.max
+            ),
+            (integrator, 16, 16)
         );
         assert!(picture.layers.iter().any(|(name, _)| name == "error"));
         let values = picture.image.pixels.iter().flatten();

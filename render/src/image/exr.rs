@@ -6,6 +6,7 @@
 //! attribute (`luxel`, a JSON text), because the order of several is not fixed by the writer.
 
 use super::Image;
+use crate::film::SampleCounts;
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Layer, LayerAttributes,
     ReadChannels, ReadLayers, SmallVec, Text, Vec2, WritableImage,
@@ -27,7 +28,7 @@ pub struct Origin {
     /// Unit of the values, for example `W/(m2 sr)`.
     pub unit: String,
     /// Samples per pixel.
-    pub samples: u32,
+    pub samples: SampleCounts,
     /// Seed of all randomness.
     pub seed: u64,
 }
@@ -89,12 +90,12 @@ pub fn encode(picture: &Picture) -> Result<Vec<u8>, EncodeExrError> {
     if let Some(origin) = &picture.origin {
         attributes.software_name = Some(text(&origin.software));
         attributes.comments = Some(text(&format!(
-            "linear RGB (Rec. 709 primaries), {}; scene {}, camera {}, integrator {}, {} samples a pixel, seed {}",
+            "linear RGB (Rec. 709 primaries), {}; scene {}, camera {}, integrator {}, {:.1} samples a pixel, seed {}",
             origin.unit,
             origin.scene,
             origin.camera,
             origin.integrator,
-            origin.samples,
+            origin.samples.mean,
             origin.seed
         )));
         let json = AttributeValue::Text(text(&serde_json::to_string(origin)?));
@@ -210,7 +211,11 @@ mod tests {
                 camera: "main".into(),
                 integrator: "path".into(),
                 unit: "W/(m2 sr)".into(),
-                samples: 16,
+                samples: SampleCounts {
+                    mean: 16.5,
+                    min: 8,
+                    max: 32,
+                },
                 seed: u64::MAX,
             }),
         }

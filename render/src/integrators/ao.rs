@@ -55,44 +55,35 @@ impl<'w> AmbientOcclusion<'w> {
     }
 
     /// Adds estimates of the ambient occlusion at receivers, the same in all channels, to a film of
-    /// one row: `samples` times the configured rays for each replicate. Progress counts receivers.
+    /// one row: `samples` times the configured rays for each replicate of every receiver. Progress
+    /// counts samples.
     ///
     /// # Panics
-    /// When the film has not one pixel for each receiver.
+    /// When the film has not one pixel for each receiver, or `samples` not one number.
     pub fn at_receivers(
         &self,
         film: &mut Film,
         receivers: &[Receiver],
-        samples: u32,
+        samples: &[u32],
         progress: &dyn Progress,
     ) {
         assert_eq!(film.size(), [receivers.len(), 1], "a pixel a receiver");
-        progress.start("ambient occlusion", receivers.len() as u64);
-        let (replicates, before) = (film.replicates(), film.samples());
-        film.expose(samples, |first, exposures| {
-            let mut openness = vec![0.0; exposures.len()];
-            for replicate in 0..replicates {
-                for index in before..before + samples {
-                    let keyed: Vec<_> = (first..first + exposures.len())
-                        .map(|receiver| {
-                            let item = receiver as u64 * u64::from(replicates);
-                            let key = SampleKey {
-                                item: item + u64::from(replicate),
-                                replicate,
-                                index,
-                            };
-                            Some((receivers[receiver], key))
-                        })
-                        .collect();
-                    self.openness(&keyed, &mut openness);
-                    for (exposure, &open) in exposures.iter_mut().zip(&openness) {
-                        exposure.add(replicate, Rgb::splat(open).into());
-                    }
-                }
-            }
-            progress.advance(exposures.len() as u64);
+        progress.start("ambient occlusion", film.cost(samples));
+        film.expose(samples, |due, seen| {
+            let keyed = due.iter().map(|due| Some((receivers[due.pixel], due.key)));
+            self.see(&keyed.collect::<Vec<_>>(), seen);
+            progress.advance(due.len() as u64);
         });
         progress.finish();
+    }
+
+    /// The openness of each receiver, in all channels.
+    fn see(&self, receivers: &[Option<(Receiver, SampleKey)>], seen: &mut [Seen]) {
+        let mut openness = vec![0.0; seen.len()];
+        self.openness(receivers, &mut openness);
+        for (seen, openness) in seen.iter_mut().zip(openness) {
+            *seen = Rgb::splat(openness).into();
+        }
     }
 
     /// The mean of V for each receiver; 1 where there is none.
@@ -163,10 +154,6 @@ impl Integrator for AmbientOcclusion<'_> {
             .zip(keys)
             .map(|((ray, hit), key)| Some((Vertex::new(self.world, ray, hit)?.receiver(), *key)))
             .collect();
-        let mut openness = vec![0.0; seen.len()];
-        self.openness(&receivers, &mut openness);
-        for (seen, openness) in seen.iter_mut().zip(openness) {
-            *seen = Rgb::splat(openness).into();
-        }
+        self.see(&receivers, seen);
     }
 }

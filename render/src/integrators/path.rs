@@ -20,7 +20,7 @@ use super::specular::{boundary, reflect};
 use super::vertex::Vertex;
 use super::{Integrator, SampleKey, Seen, background, unit_ray};
 use crate::camera::CameraRay;
-use crate::film::Film;
+use crate::film::{Due, Film};
 use crate::progress::Progress;
 use glam::DVec3;
 use luxel_scenes::{Radiance, Rgb, Specular};
@@ -36,9 +36,6 @@ const ROULETTE_FROM: u32 = 3;
 /// Highest probability of survival: even a path between perfect mirrors ends, after 1/(1 − q) =
 /// 20 bounces on average. Nearer to 1, and one such path holds up its batch.
 const MAX_SURVIVAL: f64 = 0.95;
-
-/// Points that one task computes together.
-const RECEIVERS_PER_TASK: usize = 16;
 
 /// The integrator.
 pub struct PathTracer<'w> {
@@ -86,66 +83,45 @@ impl<'w> PathTracer<'w> {
     }
 
     /// Adds estimates of the irradiance at receivers in W/m², of the given components, to a film of
-    /// one row: one path a sample. Unbiased. Progress counts receivers.
+    /// one row: `paths` for each replicate of every receiver. Unbiased. Progress counts paths.
     ///
     /// # Panics
-    /// When the film has not one pixel for each receiver.
+    /// When the film has not one pixel for each receiver, or `paths` not one number.
     pub fn irradiance(
         &self,
         film: &mut Film,
         receivers: &[Receiver],
         components: Components,
-        paths: u32,
+        paths: &[u32],
         progress: &dyn Progress,
     ) {
         assert_eq!(film.size(), [receivers.len(), 1], "a pixel a receiver");
-        progress.start("tracing paths", receivers.len() as u64);
-        let (replicates, before) = (film.replicates(), film.samples());
-        film.expose(paths, |first, exposures| {
-            for (task, exposures) in exposures.chunks_mut(RECEIVERS_PER_TASK).enumerate() {
-                let first = first + task * RECEIVERS_PER_TASK;
-                let receivers = &receivers[first..first + exposures.len()];
-                let mut wave = Wave::default();
-                let mut sums = vec![Rgb::ZERO; receivers.len()];
-                for replicate in 0..replicates {
-                    sums.fill(Rgb::ZERO);
-                    let item = |slot: usize| {
-                        (first + slot) as u64 * u64::from(replicates) + u64::from(replicate)
-                    };
-                    for index in before..before + paths {
-                        let key = |slot| SampleKey {
-                            item: item(slot),
-                            replicate,
-                            index,
-                        };
-                        self.gather(&mut wave, receivers, key, components, &mut sums);
-                    }
-                    for (exposure, sum) in exposures.iter_mut().zip(&sums) {
-                        // The receivers reflected everything, so that L = E/π left them.
-                        let irradiance = Radiance(*sum).to_irradiance();
-                        exposure.add(replicate, irradiance.0.into());
-                    }
-                }
-                progress.advance(receivers.len() as u64);
+        progress.start("tracing paths", film.cost(paths));
+        film.expose(paths, |due, seen| {
+            let mut wave = Wave::default();
+            let mut sums = vec![Rgb::ZERO; due.len()];
+            self.gather(&mut wave, receivers, due, components, &mut sums);
+            for (seen, sum) in seen.iter_mut().zip(sums) {
+                // The receivers reflected everything, so that L = E/π left them.
+                *seen = Radiance(sum).to_irradiance().0.into();
             }
+            progress.advance(due.len() as u64);
         });
         progress.finish();
     }
 
-    /// Adds the radiance that perfectly white receivers reflect, one path each.
+    /// Adds the radiance that perfectly white receivers reflect, one path for each that is due.
     fn gather(
         &self,
         wave: &mut Wave,
         receivers: &[Receiver],
-        key: impl Fn(usize) -> SampleKey,
+        due: &[Due],
         components: Components,
         sums: &mut [Rgb],
     ) {
-        wave.paths.clear();
-        wave.shadow_rays.clear();
-        wave.pending.clear();
-        for (slot, receiver) in receivers.iter().enumerate() {
-            let SampleKey { item, index, .. } = key(slot);
+        for (slot, due) in due.iter().enumerate() {
+            let receiver = &receivers[due.pixel];
+            let SampleKey { item, index, .. } = due.key;
             let path = Path {
                 slot: slot as u32,
                 ray: Ray::new(receiver.origin, receiver.normal.as_vec3()),

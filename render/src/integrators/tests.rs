@@ -377,7 +377,7 @@ fn irradiance_by_paths_agrees_with_closed_forms() {
     let factor = 4.0 / std::f64::consts::TAU * (2.0 * s * s.atan());
     let tracer = PathTracer::new(&world, 1);
     let irradiance = |components| {
-        at_a_point(|film| tracer.irradiance(film, &receivers, components, 1024, &Silent))
+        at_a_point(|film| tracer.irradiance(film, &receivers, components, &[1024], &Silent))
     };
     let expected = std::f64::consts::PI * factor;
     let (direct, error) = irradiance(Components::Direct);
@@ -409,7 +409,7 @@ fn a_uniform_sky_gives_an_open_point_pi_times_its_radiance() {
     let receivers = world.receivers(&[DVec3::ZERO], &[DVec3::Z]);
     let tracer = PathTracer::new(&world, 1);
     let (value, _) =
-        at_a_point(|film| tracer.irradiance(film, &receivers, Components::All, 8, &Silent));
+        at_a_point(|film| tracer.irradiance(film, &receivers, Components::All, &[8], &Silent));
     let expected = std::f64::consts::TAU;
     assert!((value - expected).abs() < 1e-12);
 }
@@ -432,7 +432,7 @@ fn occlusion_by_a_wall(distance: f64, config: ao::Config) -> (f64, f64) {
     let world = World::new(&scene);
     let receivers = world.receivers(&[DVec3::X * distance], &[DVec3::Z]);
     let occlusion = AmbientOcclusion::new(&world, config);
-    at_a_point(|film| occlusion.at_receivers(film, &receivers, 1, &Silent))
+    at_a_point(|film| occlusion.at_receivers(film, &receivers, &[1], &Silent))
 }
 
 #[test]

@@ -233,7 +233,8 @@ pub(super) fn path(world: &World<'_>, target: &Target, paths: usize, seed: u64) 
     let found = match target.kind() {
         Kind::Points(receivers) => {
             let mut film = Film::new([receivers.len(), 1], REPLICATES as u32);
-            tracer.irradiance(&mut film, receivers, Components::All, each as u32, &Silent);
+            let paths = film.evenly(each as u32);
+            tracer.irradiance(&mut film, receivers, Components::All, &paths, &Silent);
             estimates_of(&film, Alike::Values)
         }
         Kind::Pixels(_) => pixels(&tracer, target, paths, seed),
@@ -264,7 +265,6 @@ fn pixels(
     };
     let samples = Samples {
         replicates: REPLICATES as u32,
-        before: 0,
         per_replicate: (samples / REPLICATES).max(1) as u32,
         seed,
     };

@@ -1,6 +1,7 @@
 //! The tables as one Markdown document.
 
 use super::exact::{irradiance_field, openness};
+use super::noise::Spread;
 use super::scenes::{SCENES, Summary, reference};
 use super::solving::{RESIDUAL, rates};
 use super::{Calibration, largest, noise};
@@ -181,7 +182,9 @@ fn calibration_row(text: &mut String, id: &str, title: &str, calibration: &Calib
 fn sampling() -> String {
     let few = noise::points(NOISE_SEEDS, 4);
     let many = noise::points(NOISE_SEEDS, 2);
-    let [coarse, fine] = [16, 64].map(|samples| noise::pixels(NOISE_SEEDS, samples));
+    let pixels = |spread| noise::pixels(NOISE_SEEDS, spread).z_squared;
+    let [coarse, fine] = [16, 64].map(|samples| pixels(Spread::Even(samples)));
+    let spread = pixels(Spread::WhereNoisy { rounds: 3 });
     format!(
         "
 ## Sampling
@@ -195,6 +198,7 @@ the mean over seeds. It should lie between 0.8 and 1.25.
 | 100 points, four gathers, as for fewer | {few:.3} |
 | 400 pixels of a film, 16 samples each | {coarse:.3} |
 | 400 pixels of a film, 64 samples each | {fine:.3} |
+| 400 pixels of a film, samples where the noise is, three rounds | {spread:.3} |
 "
     )
 }

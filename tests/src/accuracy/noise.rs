@@ -9,9 +9,9 @@
 use crate::builder::{Part, parallelogram, room, scene, solid_box};
 use glam::DVec3;
 use luxel::camera::CameraFrame;
-use luxel::film::Alike;
+use luxel::film::{Alike, Film};
 use luxel::integrators::gather::{Config as FilmConfig, Gatherer};
-use luxel::integrators::{Samples, expose};
+use luxel::integrators::{Samples, expose, expose_further};
 use luxel::progress::Silent;
 use luxel_scenes::{Camera, FieldOfView, Projection, Reflectance, Rgb, Scene};
 use luxel_solver::adaptive::ROW_RAYS;
@@ -130,12 +130,38 @@ pub fn points(seeds: u64, gathers: usize) -> f64 {
     mean_z_squared(&(0..seeds).map(of_seed).collect::<Vec<_>>())
 }
 
-/// Mean z² of the pixels of a small film of `samples` samples a pixel over `seeds` seeds. An edge of the
-/// lamp is in view.
+/// How the samples of a film are spread over its pixels.
+#[derive(Clone, Copy, Debug)]
+pub enum Spread {
+    /// So many in every pixel.
+    Even(u32),
+    /// Eight in every pixel, then rounds that quarter the variance of the film where it is largest.
+    WhereNoisy {
+        /// How many rounds.
+        rounds: u32,
+    },
+}
+
+/// The pixels of a small film, an edge of the lamp in view.
+#[derive(Clone, Copy, Debug)]
+pub struct Pixels {
+    /// Mean z² of all values of all seeds.
+    pub z_squared: f64,
+    /// Mean square of the films' errors over the mean of the squares that they state.
+    pub variance_ratio: f64,
+    /// Mean samples of a pixel.
+    pub samples: f64,
+    /// Mean of all values.
+    pub mean: f64,
+    /// Its standard error over the seeds.
+    pub standard_error: f64,
+}
+
+/// The pixels of a small film over `seeds` seeds.
 ///
 /// # Panics
 /// With fewer than two seeds, or a value that is stated to be exact and is not.
-pub fn pixels(seeds: u64, samples: u32) -> f64 {
+pub fn pixels(seeds: u64, spread: Spread) -> Pixels {
     let scene = small_room();
     let world = World::new(&scene);
     let camera = Camera {
@@ -149,7 +175,8 @@ pub fn pixels(seeds: u64, samples: u32) -> f64 {
         size: [PIXELS; 2],
     };
     let frame = CameraFrame::new(&camera, camera.size).expect("a camera in the room");
-    let of_seed = |seed| -> Values {
+    let mut films = Vec::new();
+    let mut of_seed = |seed| -> Values {
         let config = FilmConfig {
             rays: RAYS_OF_SAMPLE,
             shadow_rays: RAYS_OF_SAMPLE,
@@ -157,18 +184,60 @@ pub fn pixels(seeds: u64, samples: u32) -> f64 {
         };
         let lookup = lookup(&world, seed);
         let gatherer = Gatherer::new(&world, &lookup, config);
-        let film = expose(&gatherer, &frame, Samples::new(samples, seed), &Silent);
+        let film = film(&gatherer, &frame, spread, seed);
+        let pixels = film.values().map(Rgb::element_sum).sum::<f64>();
+        let sampling = film.relative_error(Alike::Neighbours).sampling;
+        let mean = pixels / (3 * PIXELS * PIXELS) as f64;
+        films.push((mean, (sampling * mean).powi(2), film.sample_counts().mean));
         let errors = film.errors(Alike::Neighbours).expect("replicates");
         let pairs = film.values().zip(errors);
         pairs
             .flat_map(|(value, error)| channels(value, error.sampling))
             .collect()
     };
-    mean_z_squared(&(0..seeds).map(of_seed).collect::<Vec<_>>())
+    let values: Vec<Values> = (0..seeds).map(&mut of_seed).collect();
+    let n = seeds as f64;
+    let mean_of = |of: &dyn Fn(&(f64, f64, f64)) -> f64| films.iter().map(of).sum::<f64>() / n;
+    let mean = mean_of(&|film| film.0);
+    let scatter = mean_of(&|film| (film.0 - mean).powi(2));
+    Pixels {
+        z_squared: mean_z_squared(&values),
+        variance_ratio: mean_square(&values) / mean_of(&|film| film.1),
+        samples: mean_of(&|film| film.2),
+        mean,
+        standard_error: (scatter / (n - 1.0)).sqrt(),
+    }
+}
+
+/// A film whose samples are spread as asked for.
+fn film(gatherer: &Gatherer<'_>, frame: &CameraFrame, spread: Spread, seed: u64) -> Film {
+    match spread {
+        Spread::Even(samples) => expose(gatherer, frame, Samples::new(samples, seed), &Silent),
+        Spread::WhereNoisy { rounds } => {
+            let mut film = expose(gatherer, frame, Samples::new(8, seed), &Silent);
+            for _ in 0..rounds {
+                let further = film.where_noisy(4.0);
+                expose_further(&mut film, gatherer, frame, seed, &further, &Silent);
+            }
+            film
+        }
+    }
 }
 
 fn channels(value: Rgb, noise: Rgb) -> impl Iterator<Item = (f64, f64)> {
     value.to_array().into_iter().zip(noise.to_array())
+}
+
+/// Mean squared error of the values of all seeds, as they scatter about their means.
+fn mean_square(seeds: &[Values]) -> f64 {
+    let n = seeds.len() as f64;
+    let variance = |index: usize| {
+        let own = || seeds.iter().map(|values| values[index].0);
+        let mean = own().sum::<f64>() / n;
+        own().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0)
+    };
+    let count = seeds[0].len();
+    (0..count).map(variance).sum::<f64>() / count as f64
 }
 
 /// Mean of z² over the values of all seeds.
