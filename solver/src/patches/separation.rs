@@ -11,6 +11,8 @@
 //! Without this one value would stand for both sides of a wall, and light would leak through the floor
 //! below it. The sides of a two-sided face are examined apart; an element is divided for both where one is.
 //!
+//! Clusters of small faces that do not lie in one plane are furniture, not floors, and stay whole.
+//!
 //! Source: luxel's own; meshes that keep to where surfaces meet after D. R. Baum, S. Mann, K. P. Smith,
 //! J. M. Winget, "Making Radiosity Usable", SIGGRAPH 1991. Deterministic. Validity: walls as
 //! [`super::walls`] has them; a gap that none of 64 segments finds is taken for closed. Cost: seven rays for an
@@ -37,7 +39,7 @@ const POINTS: usize = 8;
 const INWARD: f64 = 0.1;
 
 /// Faces up to this share of the mean patch's side are not examined as walls or parts of them.
-const LEAST_FACE: f64 = 0.1;
+const LEAST_FACE: f64 = 0.2;
 
 /// Divides the elements of those regions that have not been examined.
 pub(super) fn separate(surfaces: &Surfaces, bvh: &Bvh, regions: &mut [Region]) {
@@ -80,6 +82,9 @@ fn cuts(surfaces: &Surfaces, bvh: &Bvh, obstacles: &Obstacles, region: &Region) 
         two_sided,
         tolerance,
     };
+    if !wide.is_planar() {
+        return None;
+    }
     let standing = obstacles.across(geometry, &region.faces, &wide);
     if standing.is_empty() {
         return None;

@@ -33,6 +33,8 @@ const STEEP: f64 = 0.05;
 
 /// Faces that may be walls.
 pub(super) struct Obstacles {
+    /// Least length along a surface.
+    least: f64,
     faces: Vec<(FaceId, Vec<DVec3>)>,
     tree: BoxTree,
 }
@@ -79,13 +81,15 @@ impl Surface<'_> {
         extent(self.corners(), direction)
     }
 
-    /// The plane through the line in which a wall's plane meets the surface, perpendicular to it; that of
-    /// the wall itself where the surface is not planar.
-    fn line(&self, wall: Plane) -> Plane {
+    /// Whether it lies in one plane, within the tolerance.
+    pub(super) fn is_planar(&self) -> bool {
         let [low, high] = self.extent(self.normal);
-        if high - low > self.tolerance {
-            return wall;
-        }
+        high - low <= self.tolerance
+    }
+
+    /// The plane through the line in which a wall's plane meets the surface, perpendicular to it.
+    fn line(&self, wall: Plane) -> Plane {
+        let [low, _] = self.extent(self.normal);
         let tilt = wall.normal.dot(self.normal);
         let across = wall.normal - self.normal * tilt;
         let length = across.length();
@@ -139,8 +143,15 @@ fn extent<'p>(points: impl IntoIterator<Item = &'p DVec3>, direction: DVec3) -> 
         })
 }
 
+/// The same of all that is in a box.
+fn extent_of_box([lower, upper]: Bounds, direction: DVec3) -> [f64; 2] {
+    let (centre, half) = (0.5 * (lower + upper), 0.5 * (upper - lower));
+    let (middle, reach) = (centre.dot(direction), half.dot(direction.abs()));
+    [middle - reach, middle + reach]
+}
+
 impl Obstacles {
-    /// The faces of a scene whose extent is at least `least` units.
+    /// The faces of a scene whose extent is at least `least` units; along a surface they must be as long.
     pub(super) fn new(geometry: &Geometry, least: f64) -> Self {
         let faces: Vec<(FaceId, Vec<DVec3>)> = (0..geometry.face_count())
             .map(FaceId::new)
@@ -148,7 +159,7 @@ impl Obstacles {
             .map(|face| (face, geometry.polygon(face)))
             .collect();
         let tree = BoxTree::new(faces.iter().map(|(_, polygon)| bounds_of(polygon)));
-        Self { faces, tree }
+        Self { least, faces, tree }
     }
 
     /// The faces, of others than `own`, that may be walls of elements of a region: its whole surface, with
@@ -160,23 +171,31 @@ impl Obstacles {
         region: &Surface,
     ) -> Standing<'_> {
         let mut found = Vec::new();
-        let bounds = grown(region.bounds(), region.lift + region.tolerance);
+        let own_bounds = region.bounds();
+        let bounds = grown(own_bounds, region.lift + region.tolerance);
+        let bands: Vec<[f64; 2]> = region.bands().collect();
         self.tree.search(&bounds, |position| {
             let (face, polygon) = &self.faces[position];
             let normal = geometry.normal(*face);
-            let direction = normal.cross(region.normal);
-            if direction.length() < STEEP || own.contains(face) {
+            let along = normal.cross(region.normal);
+            let sine = along.length();
+            let [start, end] = extent(polygon, along);
+            // Legs of furniture are as long as walls, but not along the floor.
+            if sine < STEEP || end - start < self.least * sine {
                 return;
             }
+            let [low, high] = extent(polygon, region.normal);
+            let touches = bands.iter().any(|band| low <= band[1] && high >= band[0]);
             let plane = Plane::through(polygon[0], normal);
-            let [low, high] = region.extent(normal);
-            let divides =
-                low < plane.offset - region.tolerance && high > plane.offset + region.tolerance;
-            let touches = region.bands().any(|band| {
-                let [low, high] = extent(polygon, region.normal);
-                low <= band[1] && high >= band[0]
-            });
-            if divides && touches {
+            let divides = |[low, high]: [f64; 2]| {
+                low < plane.offset - region.tolerance && high > plane.offset + region.tolerance
+            };
+            // The box first: a cluster may have many corners.
+            if touches
+                && divides(extent_of_box(own_bounds, normal))
+                && !own.contains(face)
+                && divides(region.extent(normal))
+            {
                 found.push((plane, polygon.as_slice()));
             }
         });
@@ -204,22 +223,30 @@ impl Standing<'_> {
     /// The walls across an element.
     pub(super) fn barriers(&self, element: &Surface) -> Vec<Barrier> {
         let mut near = Vec::new();
-        let bounds = grown(element.bounds(), element.lift + element.tolerance);
+        let own_bounds = element.bounds();
+        let bounds = grown(own_bounds, element.lift + element.tolerance);
         self.tree.search(&bounds, |position| near.push(position));
+        if near.is_empty() {
+            return Vec::new();
+        }
         near.sort_unstable();
+        let bands: Vec<([f64; 2], bool)> = element.bands().zip([true, false]).collect();
         let mut barriers: Vec<Barrier> = Vec::new();
         for (plane, polygon) in near.into_iter().map(|position| self.faces[position]) {
-            let along = plane.normal.cross(element.normal).normalize();
-            let [low, high] = element.extent(plane.normal);
-            if low > plane.offset + element.tolerance || high < plane.offset - element.tolerance {
+            let meets = |[low, high]: [f64; 2]| {
+                low <= plane.offset + element.tolerance && high >= plane.offset - element.tolerance
+            };
+            if !meets(extent_of_box(own_bounds, plane.normal))
+                || !meets(element.extent(plane.normal))
+            {
                 continue;
             }
+            let along = plane.normal.cross(element.normal).normalize();
             let [start, end] = element.extent(along);
             let is_panel = |[low, high]: &[f64; 2]| high - low >= PANEL * (end - start);
-            let spans: Vec<[f64; 2]> = element
-                .bands()
-                .zip([true, false])
-                .filter_map(|(band, is_front)| element.stands(polygon, band, is_front))
+            let spans: Vec<[f64; 2]> = bands
+                .iter()
+                .filter_map(|&(band, is_front)| element.stands(polygon, band, is_front))
                 .map(|part| extent(&part, along))
                 .filter(is_panel)
                 .collect();
