@@ -41,7 +41,7 @@ pub(super) fn collapse(binary: &Binary, geometry: &Geometry) -> Wide {
     let plans = plan(binary);
     let mut wide = Wide {
         nodes: vec![Node::EMPTY],
-        blocks: Vec::new(),
+        blocks: vec![Block::EMPTY],
         depth: 1,
         leaf_order: Vec::new(),
     };

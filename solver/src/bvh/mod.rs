@@ -6,8 +6,11 @@
 
 mod build;
 mod collapse;
+#[cfg(target_arch = "x86_64")]
+mod kernel;
 mod node;
 mod ray;
+mod slabs;
 mod traverse;
 mod triangle;
 
@@ -39,9 +42,32 @@ impl Bvh {
         let Some(wide) = &self.wide else {
             return hits.fill(Hit::MISS);
         };
-        let mut stack = traverse::stack_for(wide);
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = traverse::closest(wide, ray, &mut stack);
+        #[cfg(target_arch = "x86_64")]
+        if kernel::closest(wide, rays, hits) {
+            return;
+        }
+        traverse::closest_hits(wide, rays, hits);
+    }
+
+    /// What [`Self::closest_hits`] answers, faster for rays whose neighbours in the batch start at
+    /// one point in nearly one direction: those of a camera.
+    ///
+    /// # Panics
+    /// When `hits` is not as long as `rays`.
+    pub fn closest_hits_coherent(&self, rays: &[Ray], hits: &mut [Hit]) {
+        self.closest_hits(rays, hits);
+    }
+
+    /// What [`Self::closest_hits`] answers, bit by bit, without the kernel of the processor: for
+    /// tests and comparisons.
+    ///
+    /// # Panics
+    /// When `hits` is not as long as `rays`.
+    pub fn closest_hits_portable(&self, rays: &[Ray], hits: &mut [Hit]) {
+        assert_eq!(rays.len(), hits.len(), "one hit for each ray");
+        match &self.wide {
+            Some(wide) => traverse::closest_hits(wide, rays, hits),
+            None => hits.fill(Hit::MISS),
         }
     }
 
@@ -54,9 +80,23 @@ impl Bvh {
         let Some(wide) = &self.wide else {
             return blocked.fill(false);
         };
-        let mut stack = traverse::stack_for(wide);
-        for (ray, answer) in rays.iter().zip(blocked) {
-            *answer = traverse::any(wide, ray, &mut stack);
+        #[cfg(target_arch = "x86_64")]
+        if kernel::any(wide, rays, blocked) {
+            return;
+        }
+        traverse::occluded(wide, rays, blocked);
+    }
+
+    /// What [`Self::occluded`] answers, without the kernel of the processor: for tests and
+    /// comparisons.
+    ///
+    /// # Panics
+    /// When `blocked` is not as long as `rays`.
+    pub fn occluded_portable(&self, rays: &[Ray], blocked: &mut [bool]) {
+        assert_eq!(rays.len(), blocked.len(), "one answer for each ray");
+        match &self.wide {
+            Some(wide) => traverse::occluded(wide, rays, blocked),
+            None => blocked.fill(false),
         }
     }
 

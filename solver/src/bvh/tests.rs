@@ -1,5 +1,7 @@
 //! The tree against brute force, degenerate scenes first, and rays aimed at edges and corners.
 
+mod twins;
+
 use super::{Bvh, Hit, Ray};
 use crate::geometry::{Geometry, TriangleId};
 use crate::sampling::{Stage, hash, sphere};

@@ -1,0 +1,90 @@
+//! Rays against the eight boxes of a node.
+//!
+//! A box is met where max over axes of (near − o) / d ≤ min over axes of (far − o) / d. Far
+//! distances are enlarged by 1 + 4ε (T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013), and the
+//! boxes are padded when the tree is built, so that rounding never misses one.
+//!
+//! The entry distance is rounded towards zero by three bits, which the kernel needs for the number
+//! of the lane. Rounding is monotone: a box inside another has no smaller entry, and is never met
+//! where the outer one is not. Vector kernels do the same operations, so that which boxes a ray
+//! meets, and where, is the same in all.
+
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over lanes without branches become vector instructions"
+)]
+
+use super::node::{Node, WIDTH};
+use super::ray::Ray;
+use super::triangle::safe_reciprocal;
+use glam::Vec3;
+
+/// 1 + 4ε with ε = 2⁻²⁴: covers the three roundings of a slab distance.
+pub(super) const FAR_SLACK: f32 = 1.0 + 4.0 / 16_777_216.0;
+
+/// Bits of an entry distance that are cleared: enough for the number of a lane.
+pub(super) const LANE_BITS: u32 = WIDTH as u32 - 1;
+
+/// The part of the test that depends on the ray only.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slabs {
+    pub(super) origin: Vec3,
+    pub(super) reciprocal: Vec3,
+    /// Per axis, the index in [`Node::planes`] of the plane that the ray enters through; the other
+    /// one differs in the last bit.
+    pub(super) near: [usize; 3],
+    /// Nearest distance that counts, not −0.
+    pub(super) tmin: f32,
+}
+
+impl Slabs {
+    #[inline]
+    pub(super) fn new(ray: &Ray) -> Self {
+        let reciprocal = safe_reciprocal(ray.direction);
+        let near = [0, 1, 2].map(|axis| 2 * axis + usize::from(reciprocal[axis] < 0.0));
+        Self {
+            origin: ray.origin,
+            reciprocal,
+            near,
+            tmin: ray.tmin + 0.0,
+        }
+    }
+
+    /// Entry distances of the eight boxes; infinite where a box is missed or entered beyond `tmax`.
+    #[inline]
+    pub(super) fn entries(&self, node: &Node, tmax: f32) -> [f32; WIDTH] {
+        let mut enter = [f32::NEG_INFINITY; WIDTH];
+        let mut leave = [f32::INFINITY; WIDTH];
+        for axis in 0..3 {
+            let near = &node.planes[self.near[axis]];
+            let far = &node.planes[self.near[axis] ^ 1];
+            let (origin, reciprocal) = (self.origin[axis], self.reciprocal[axis]);
+            for lane in 0..WIDTH {
+                let first = (near[lane] - origin) * reciprocal;
+                let second = (far[lane] - origin) * reciprocal;
+                enter[lane] = larger(enter[lane], first);
+                leave[lane] = smaller(leave[lane], second);
+            }
+        }
+        let mut entries = [f32::INFINITY; WIDTH];
+        for lane in 0..WIDTH {
+            let enter = larger(enter[lane], self.tmin);
+            let enter = f32::from_bits(enter.to_bits() & !LANE_BITS);
+            if enter <= smaller(leave[lane] * FAR_SLACK, tmax) {
+                entries[lane] = enter;
+            }
+        }
+        entries
+    }
+}
+
+/// The maximum as vector instructions compute it: the second where the two are equal.
+#[inline]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[inline]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
