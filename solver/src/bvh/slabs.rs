@@ -16,7 +16,6 @@
 
 use super::node::{Node, WIDTH};
 use super::ray::Ray;
-use super::triangle::safe_reciprocal;
 use glam::Vec3;
 
 /// 1 + 4ε with ε = 2⁻²⁴: covers the three roundings of a slab distance.
@@ -24,6 +23,12 @@ pub(super) const FAR_SLACK: f32 = 1.0 + 4.0 / 16_777_216.0;
 
 /// Bits of an entry distance that are cleared: enough for the number of a lane.
 pub(super) const LANE_BITS: u32 = WIDTH as u32 - 1;
+
+/// Components of directions below it count as it.
+pub(super) const LEAST_COMPONENT: f32 = 1e-30;
+
+/// The reciprocal of the least component: finite, and a plane's distance times it is, too.
+pub(super) const RECIPROCAL_OF_LESS: f32 = 1e30;
 
 /// The part of the test that depends on the ray only.
 #[derive(Clone, Copy, Debug)]
@@ -53,38 +58,54 @@ impl Slabs {
     /// Entry distances of the eight boxes; infinite where a box is missed or entered beyond `tmax`.
     #[inline]
     pub(super) fn entries(&self, node: &Node, tmax: f32) -> [f32; WIDTH] {
-        let mut enter = [f32::NEG_INFINITY; WIDTH];
-        let mut leave = [f32::INFINITY; WIDTH];
+        let mut enter = [self.tmin; WIDTH];
+        let mut leave = [tmax; WIDTH];
         for axis in 0..3 {
             let near = &node.planes[self.near[axis]];
             let far = &node.planes[self.near[axis] ^ 1];
             let (origin, reciprocal) = (self.origin[axis], self.reciprocal[axis]);
             for lane in 0..WIDTH {
                 let first = (near[lane] - origin) * reciprocal;
-                let second = (far[lane] - origin) * reciprocal;
-                enter[lane] = larger(enter[lane], first);
-                leave[lane] = smaller(leave[lane], second);
+                let second = (far[lane] - origin) * reciprocal * FAR_SLACK;
+                enter[lane] = if first > enter[lane] {
+                    first
+                } else {
+                    enter[lane]
+                };
+                leave[lane] = if second < leave[lane] {
+                    second
+                } else {
+                    leave[lane]
+                };
             }
         }
         let mut entries = [f32::INFINITY; WIDTH];
         for lane in 0..WIDTH {
-            let enter = larger(enter[lane], self.tmin);
-            let enter = f32::from_bits(enter.to_bits() & !LANE_BITS);
-            if enter <= smaller(leave[lane] * FAR_SLACK, tmax) {
-                entries[lane] = enter;
-            }
+            let enter = f32::from_bits(enter[lane].to_bits() & !LANE_BITS);
+            entries[lane] = if enter <= leave[lane] {
+                enter
+            } else {
+                f32::INFINITY
+            };
         }
         entries
     }
 }
 
-/// The maximum as vector instructions compute it: the second where the two are equal.
+/// The reciprocals of a direction's components; of zeros, and of what is too small, a large number
+/// of the same sign that is finite.
 #[inline]
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-#[inline]
-fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
+fn safe_reciprocal(direction: Vec3) -> Vec3 {
+    let reciprocal = |component: f32| {
+        if component.abs() < LEAST_COMPONENT {
+            RECIPROCAL_OF_LESS.copysign(component)
+        } else {
+            1.0 / component
+        }
+    };
+    Vec3::new(
+        reciprocal(direction.x),
+        reciprocal(direction.y),
+        reciprocal(direction.z),
+    )
 }

@@ -5,7 +5,7 @@
 //! top.
 //!
 //! The answer does not depend on the order of visits. No triangle is hit nearer than the entry
-//! into its block's box ([`triangle::resolve`] raises the distance), no box is entered nearer than
+//! into its block's box (a nearer distance is raised), no box is entered nearer than
 //! a box around it, and boxes are passed over only when they are entered beyond the nearest hit.
 //! So the nearest hit, and of those at the same distance the one of lowest id, is found in any
 //! order, and every kernel gives the same bits.
@@ -56,20 +56,8 @@ fn closest(wide: &Wide, ray: &Ray, stack: &mut Stack) -> Hit {
         }
         if child.is_block() {
             let block = &wide.blocks[child.index()];
-            let edges = triangle::edges(block, &shear);
-            let mut lanes = triangle::candidates(&edges);
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                let edge = edges.map(|edge| edge[lane]);
-                let limits = [ray.tmin, entry, nearest];
-                if let Some(point) = triangle::resolve(block, &shear, lane, edge, limits)
-                    && best.is_replaced_by(&point, nearest, block.triangles[lane])
-                {
-                    nearest = point.t;
-                    best = Hit::new(point, block.triangles[lane]);
-                }
-            }
+            let limits = [ray.tmin, entry];
+            triangle::nearest(block, &shear, limits, &mut nearest, &mut best);
         } else {
             let node = &wide.nodes[child.index()];
             let entries = slabs.entries(node, nearest);
@@ -100,17 +88,10 @@ fn any(wide: &Wide, ray: &Ray, stack: &mut Stack) -> bool {
     while let Some((child, entry)) = stack.pop() {
         if child.is_block() {
             let block = &wide.blocks[child.index()];
-            let edges = triangle::edges(block, &shear);
-            let mut lanes = triangle::candidates(&edges);
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                let edge = edges.map(|edge| edge[lane]);
-                // The entry is at most `farthest`, so that it decides nothing here.
-                let limits = [ray.tmin, entry, farthest];
-                if triangle::resolve(block, &shear, lane, edge, limits).is_some() {
-                    return true;
-                }
+            let limits = [ray.tmin, entry];
+            let (mut nearest, mut hit) = (farthest, Hit::MISS);
+            if triangle::nearest(block, &shear, limits, &mut nearest, &mut hit) {
+                return true;
             }
         } else {
             let node = &wide.nodes[child.index()];

@@ -11,8 +11,8 @@
 //! lanes that are inside is therefore that to the plane of the corners, in f64: exact but for its
 //! last rounding.
 //!
-//! [`edges`] and [`candidates`] are what the vector kernel does with its own instructions, the
-//! same operations in the same order; [`resolve`] is shared, so that both give the same bits.
+//! A kernel with vector instructions does the same operations in the same order, so that it gives
+//! the same bits; what is rare it leaves to [`nearest`].
 //!
 //! Source: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", Journal of
 //! Computer Graphics Techniques 2(1), 2013. Valid for finite coordinates and a direction that is
@@ -26,8 +26,8 @@
 )]
 
 use super::node::{BLOCK, Block};
-use super::ray::Ray;
-use glam::{DVec3, Vec3};
+use super::ray::{Hit, Ray};
+use glam::DVec3;
 
 /// The part of the test that depends on the ray only.
 #[derive(Clone, Copy, Debug)]
@@ -69,7 +69,7 @@ impl Shear {
 
 /// The edge functions of all lanes, `[edge][lane]`.
 #[inline]
-pub(super) fn edges(block: &Block, shear: &Shear) -> [[f32; BLOCK]; 3] {
+fn edges(block: &Block, shear: &Shear) -> [[f32; BLOCK]; 3] {
     let [kx, ky, kz] = shear.axes;
     let [ox, oy, oz] = shear.origin;
     let [sx, sy] = shear.scale;
@@ -94,7 +94,7 @@ pub(super) fn edges(block: &Block, shear: &Shear) -> [[f32; BLOCK]; 3] {
 
 /// The lanes whose edge functions do not differ in sign, as bits; zeros agree with either.
 #[inline]
-pub(super) fn candidates(edge: &[[f32; BLOCK]; 3]) -> u32 {
+fn candidates(edge: &[[f32; BLOCK]; 3]) -> u32 {
     let mut bits = 0;
     for lane in 0..BLOCK {
         let [a, b, c] = [edge[0][lane], edge[1][lane], edge[2][lane]];
@@ -116,6 +116,35 @@ pub(super) struct Point {
     pub(super) v: f32,
 }
 
+/// Lets the hits of a block replace `best`, which is at `nearest` unless it is a miss, and says
+/// whether there is one. `entry` is where the ray enters the block's box.
+#[inline]
+pub(super) fn nearest(
+    block: &Block,
+    shear: &Shear,
+    [tmin, entry]: [f32; 2],
+    nearest: &mut f32,
+    best: &mut Hit,
+) -> bool {
+    let edges = edges(block, shear);
+    let mut lanes = candidates(&edges);
+    let mut found = false;
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize;
+        lanes &= lanes - 1;
+        let edge = edges.map(|edge| edge[lane]);
+        let id = block.triangles[lane];
+        if let Some(point) = resolve(block, shear, lane, edge, [tmin, entry, *nearest])
+            && best.is_replaced_by(&point, *nearest, id)
+        {
+            *nearest = point.t;
+            *best = Hit::new(point, id);
+            found = true;
+        }
+    }
+    found
+}
+
 /// The hit of a candidate lane with the given edge functions, when its distance is at least `tmin`
 /// and, raised to `entry`, at most `tmax`.
 ///
@@ -123,7 +152,7 @@ pub(super) struct Point {
 /// the plane lies nearer than the box does; its distance becomes that of the box. No block can then
 /// hold a hit nearer than its box, and the answer does not depend on the order of the blocks.
 #[inline]
-pub(super) fn resolve(
+fn resolve(
     block: &Block,
     shear: &Shear,
     lane: usize,
@@ -195,22 +224,4 @@ fn edge_distance(block: &Block, shear: &Shear, lane: usize, edge: [f32; 3]) -> f
     let depth =
         |corner: usize| scale * (block.corners[corner][shear.axes[2]][lane] - shear.origin[2]);
     edge[0] * depth(0) + edge[1] * depth(1) + edge[2] * depth(2)
-}
-
-/// The reciprocals of a direction's components; of zeros, and of what is too small, a large number
-/// of the same sign that is finite.
-#[inline]
-pub(super) fn safe_reciprocal(direction: Vec3) -> Vec3 {
-    let reciprocal = |component: f32| {
-        if component.abs() < 1e-30 {
-            1e30_f32.copysign(component)
-        } else {
-            1.0 / component
-        }
-    };
-    Vec3::new(
-        reciprocal(direction.x),
-        reciprocal(direction.y),
-        reciprocal(direction.z),
-    )
 }

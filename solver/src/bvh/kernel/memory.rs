@@ -1,11 +1,8 @@
 //! All that the kernel reads and writes without a check of bounds, in a few wrappers.
 
-use super::super::collapse::Wide;
-use super::super::node::{BLOCK, Block, Child, Node, WIDTH};
-use std::arch::x86_64::{
-    __m128, __m256, __m256i, _MM_HINT_T0, _mm_load_ps, _mm_prefetch, _mm_storeu_ps, _mm256_load_ps,
-    _mm256_load_si256, _mm256_loadu_si256, _mm256_storeu_si256,
-};
+use crate::bvh::collapse::Wide;
+use crate::bvh::node::{BLOCK, Block, Child, Node, WIDTH};
+use std::arch::x86_64::*;
 use std::marker::PhantomData;
 
 /// Bytes of one plane of a node.
@@ -111,6 +108,30 @@ pub(super) fn store(target: &mut [f32; BLOCK], lanes: __m128) {
     unsafe { _mm_storeu_ps(target.as_mut_ptr(), lanes) }
 }
 
+/// Writes four lanes of f64.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn store_f64(target: &mut [f64; 4], lanes: __m256d) {
+    // SAFETY: an unaligned store of four numbers into an array of four.
+    unsafe { _mm256_storeu_pd(target.as_mut_ptr(), lanes) }
+}
+
+/// Writes four lanes of integers.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn store_u32(target: &mut [u32; 4], lanes: __m128i) {
+    // SAFETY: an unaligned store of four numbers into an array of four.
+    unsafe { _mm_storeu_si128(target.as_mut_ptr().cast(), lanes) }
+}
+
+/// Reads four integers.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn load_axes(axes: &[u32; 4]) -> __m128i {
+    // SAFETY: an unaligned load of four numbers from an array of four.
+    unsafe { _mm_loadu_si128(axes.as_ptr().cast()) }
+}
+
 /// The memory of the stacks of several rays.
 pub(super) struct StackMemory {
     children: Vec<Child>,
@@ -120,9 +141,9 @@ pub(super) struct StackMemory {
 
 impl StackMemory {
     /// `count` stacks for the paths through `wide`. On a path each node leaves at most seven
-    /// children behind; one entry lies at the bottom, and eight are written at a time.
+    /// children behind; one entry lies at the bottom, and up to sixteen are read at a time.
     pub(super) fn new(wide: &Wide, count: usize) -> Self {
-        let capacity = 1 + (WIDTH - 1) * wide.depth + WIDTH;
+        let capacity = 1 + (WIDTH - 1) * wide.depth + 2 * WIDTH;
         Self {
             children: vec![Child::NOTHING; capacity * count],
             keys: vec![0; capacity * count],
@@ -131,15 +152,12 @@ impl StackMemory {
     }
 
     /// The stacks, each with [`Child::NOTHING`] at the bottom.
-    pub(super) fn stacks<const COUNT: usize>(&mut self) -> [Stack<'_>; COUNT] {
-        assert!(
-            COUNT * self.capacity <= self.children.len() && self.keys.len() == self.children.len(),
-            "as many stacks as there is memory for"
-        );
+    pub(super) fn stacks(&mut self) -> impl Iterator<Item = Stack<'_>> {
         let (children, keys) = (self.children.as_mut_ptr(), self.keys.as_mut_ptr());
-        std::array::from_fn(|index| Stack {
-            children: children.wrapping_add(index * self.capacity),
-            keys: keys.wrapping_add(index * self.capacity),
+        let starts = (0..self.children.len()).step_by(self.capacity);
+        starts.map(move |start| Stack {
+            children: children.wrapping_add(start),
+            keys: keys.wrapping_add(start),
             lifetime: PhantomData,
         })
     }

@@ -15,8 +15,10 @@
     reason = "the names of intrinsics say where they come from"
 )]
 
+mod block;
 mod memory;
 mod order;
+mod setup;
 mod wave;
 
 use super::collapse::Wide;

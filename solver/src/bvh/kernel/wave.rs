@@ -15,13 +15,15 @@
 //! Cost: about 1000 instructions a diffuse ray in a furnished room. Measured: sixteen rays are as
 //! good as 12 or 32; one block a leaf step and the prefetch by table are worth a third.
 
-use super::super::node::{BLOCK, Block, Child, Node};
-use super::super::ray::{Hit, Ray};
-use super::super::slabs::{FAR_SLACK, LANE_BITS, Slabs};
-use super::super::triangle::{self, Shear};
+use super::block;
 use super::memory::{self, Stack, StackMemory, Tree};
 use super::order::{COMPACTION, sorted_descending};
+use super::setup::Setup;
 use crate::bvh::collapse::Wide;
+use crate::bvh::node::{BLOCK, Child, Node};
+use crate::bvh::ray::{Hit, Ray};
+use crate::bvh::slabs::{FAR_SLACK, LANE_BITS};
+use crate::bvh::triangle::{self, Shear};
 use std::arch::x86_64::*;
 
 /// Rays in flight.
@@ -35,14 +37,9 @@ struct Slot<'a> {
     /// Entries of the stack below `current`.
     pending: usize,
     stack: Stack<'a>,
-    origin: [f32; 3],
-    reciprocal: [f32; 3],
-    /// Byte offsets of the planes that the ray enters through.
-    near: [usize; 3],
-    tmin: f32,
     /// The nearest hit so far, or the largest distance that counts.
     nearest: f32,
-    shear: Shear,
+    setup: Setup,
     best: Hit,
     /// Number of the ray in its batch.
     ray: usize,
@@ -50,18 +47,14 @@ struct Slot<'a> {
 
 impl<'a> Slot<'a> {
     #[inline]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
     fn new(stack: Stack<'a>, ray: &Ray, index: usize) -> Self {
-        let slabs = Slabs::new(ray);
         Self {
             current: Child::ROOT,
             pending: 1,
             stack,
-            origin: slabs.origin.to_array(),
-            reciprocal: slabs.reciprocal.to_array(),
-            near: slabs.near.map(|plane| plane * memory::PLANE),
-            tmin: slabs.tmin,
             nearest: ray.tmax.next_down(),
-            shear: Shear::new(ray),
+            setup: Setup::new(ray),
             best: Hit::MISS,
             ray: index,
         }
@@ -108,17 +101,15 @@ impl Turns {
 /// Traces a batch: the closest hits, or with `ANY` whether there is a hit.
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
 pub(super) fn trace<const ANY: bool>(wide: &Wide, rays: &[Ray], answers: &mut Answers<'_>) {
-    let Some(first) = rays.first() else { return };
     let tree = Tree::new(wide);
-    let mut memory = StackMemory::new(wide, WAVE);
-    let stacks: [Stack<'_>; WAVE] = memory.stacks();
-    let mut slots = stacks.map(|stack| Slot::new(stack, first, 0));
+    let mut memory = StackMemory::new(wide, WAVE.min(rays.len()));
+    let mut slots = Vec::with_capacity(WAVE);
     let (mut nodes, mut leaves) = (Turns::default(), Turns::default());
-    let mut next = rays.len().min(WAVE);
-    for (index, ray) in rays.iter().take(WAVE).enumerate() {
-        slots[index] = Slot::new(stacks[index], ray, index);
+    for (index, (ray, stack)) in rays.iter().zip(memory.stacks()).enumerate() {
+        slots.push(Slot::new(stack, ray, index));
         nodes.push_if(true, index);
     }
+    let mut next = slots.len();
     while nodes.count + leaves.count > 0 {
         // Slots are appended no faster than they are read, so that the list is rebuilt in place.
         let turns = std::mem::take(&mut nodes.count);
@@ -137,7 +128,8 @@ pub(super) fn trace<const ANY: bool>(wide: &Wide, rays: &[Ray], answers: &mut An
             let index = leaves.get(turn);
             let slot = &mut slots[index];
             // SAFETY: as above for blocks; the bottom of the stack is a block and ends the ray.
-            let ended = slot.current == Child::NOTHING || unsafe { leaf_step::<ANY>(&tree, slot) };
+            let ended = slot.current == Child::NOTHING
+                || unsafe { leaf_step::<ANY>(&tree, slot, &rays[slot.ray]) };
             if ended {
                 if ANY {
                     answers.blocked[slot.ray] = slot.current != Child::NOTHING;
@@ -159,32 +151,47 @@ pub(super) fn trace<const ANY: bool>(wide: &Wide, rays: &[Ray], answers: &mut An
     }
 }
 
+/// Where the ray enters and leaves the eight slabs of an axis.
+///
+/// # Safety
+/// The slot's `setup.near` are offsets of planes.
+#[inline]
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+unsafe fn slab(node: &Node, slot: &Slot<'_>, axis: usize) -> (__m256, __m256) {
+    // SAFETY: the caller's promise; the two planes of an axis differ in one bit.
+    let (near, far) = unsafe {
+        (
+            memory::planes(node, slot.setup.near[axis] as usize),
+            memory::planes(node, slot.setup.near[axis] as usize ^ memory::PLANE),
+        )
+    };
+    let origin = _mm256_set1_ps(slot.setup.origin[axis]);
+    let reciprocal = _mm256_set1_ps(slot.setup.reciprocal[axis]);
+    (
+        _mm256_mul_ps(_mm256_sub_ps(near, origin), reciprocal),
+        _mm256_mul_ps(_mm256_sub_ps(far, origin), reciprocal),
+    )
+}
+
 /// Entry distances of the eight boxes as bits, the lowest three cleared, and a mask of the boxes
 /// that are missed. The operations of [`Slabs::entries`].
 ///
 /// # Safety
-/// The slot's `near` are offsets of planes.
+/// The slot's `setup.near` are offsets of planes.
 #[inline]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
 unsafe fn entries(node: &Node, slot: &Slot<'_>) -> (__m256i, __m256) {
-    let [(ex, lx), (ey, ly), (ez, lz)] = [0, 1, 2].map(|axis| {
-        // SAFETY: the caller's promise; the two planes of an axis differ in one bit.
-        let (near, far) = unsafe {
-            (
-                memory::planes(node, slot.near[axis]),
-                memory::planes(node, slot.near[axis] ^ memory::PLANE),
-            )
-        };
-        let origin = _mm256_set1_ps(slot.origin[axis]);
-        let reciprocal = _mm256_set1_ps(slot.reciprocal[axis]);
+    // SAFETY: the caller's promise.
+    let ((ex, lx), (ey, ly), (ez, lz)) = unsafe {
         (
-            _mm256_mul_ps(_mm256_sub_ps(near, origin), reciprocal),
-            _mm256_mul_ps(_mm256_sub_ps(far, origin), reciprocal),
+            slab(node, slot, 0),
+            slab(node, slot, 1),
+            slab(node, slot, 2),
         )
-    });
+    };
     let enter = _mm256_max_ps(
         _mm256_max_ps(_mm256_max_ps(ex, ey), ez),
-        _mm256_set1_ps(slot.tmin),
+        _mm256_set1_ps(slot.setup.tmin),
     );
     let leave = _mm256_mul_ps(
         _mm256_min_ps(_mm256_min_ps(lx, ly), lz),
@@ -244,41 +251,50 @@ unsafe fn node_step<const ANY: bool>(tree: &Tree<'_>, slot: &mut Slot<'_>) {
 /// `slot.current` names a block of the tree, at the end of the path that the stack holds.
 #[inline]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-unsafe fn leaf_step<const ANY: bool>(tree: &Tree<'_>, slot: &mut Slot<'_>) -> bool {
+unsafe fn leaf_step<const ANY: bool>(tree: &Tree<'_>, slot: &mut Slot<'_>, ray: &Ray) -> bool {
     // SAFETY: the caller's promise.
     let block = unsafe { tree.block(slot.current) };
-    let (edges, mut lanes) = candidates(block, &slot.shear);
-    if lanes != 0 {
-        let mut edge = [[0f32; BLOCK]; 3];
-        for (stored, edge) in edge.iter_mut().zip(edges) {
-            memory::store(stored, edge);
-        }
-        // SAFETY: the key of `current` is still where it was popped from.
+    let edges = block::edges(block, &slot.setup);
+    let inside = edges.inside();
+    if _mm_movemask_ps(inside) != 0 {
         let entry = if ANY {
+            // It decides nothing for an answer without a distance.
             0.0
         } else {
-            f32::from_bits(unsafe { slot.stack.key(slot.pending) } as u32 & !LANE_BITS)
+            // SAFETY: the key of `current` is still where it was popped from.
+            let key = unsafe { slot.stack.key(slot.pending) };
+            f32::from_bits(key as u32 & !LANE_BITS)
         };
-        let mut found = false;
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize % BLOCK;
-            lanes &= lanes - 1;
-            let limits = [slot.tmin, entry, slot.nearest];
-            let edge = edge.map(|edge| edge[lane]);
-            let id = block.triangles[lane];
-            if let Some(point) = triangle::resolve(block, &slot.shear, lane, edge, limits) {
-                if ANY {
+        let before = slot.nearest;
+        match block::points(block, &slot.setup, &edges, inside, [entry, before]) {
+            Some(points) => {
+                let mut lanes = points.lanes;
+                if ANY && lanes != 0 {
                     return true;
                 }
-                if slot.best.is_replaced_by(&point, slot.nearest, id) {
-                    slot.nearest = point.t;
-                    slot.best = Hit::new(point, id);
-                    found = true;
+                while lanes != 0 {
+                    let lane = lanes.trailing_zeros() as usize;
+                    lanes &= lanes - 1;
+                    let (point, id) = (points.point(lane), block.triangles[lane % BLOCK]);
+                    if point.t <= slot.nearest && slot.best.is_replaced_by(&point, slot.nearest, id)
+                    {
+                        slot.nearest = point.t;
+                        slot.best = Hit::new(point, id);
+                    }
+                }
+            }
+            None => {
+                let shear = Shear::new(ray);
+                let limits = [ray.tmin, entry];
+                let found =
+                    triangle::nearest(block, &shear, limits, &mut slot.nearest, &mut slot.best);
+                if ANY && found {
+                    return true;
                 }
             }
         }
-        if found {
-            // SAFETY: `pending` is below the capacity by eight or more.
+        if !ANY && slot.nearest < before {
+            // SAFETY: `pending` is below the capacity by sixteen or more.
             unsafe { compact(slot) };
         }
     }
@@ -287,68 +303,49 @@ unsafe fn leaf_step<const ANY: bool>(tree: &Tree<'_>, slot: &mut Slot<'_>) -> bo
     false
 }
 
-/// The edge functions of four triangles, and the lanes where they do not differ in sign. The
-/// operations of [`triangle::edges`]; the lanes are those of [`triangle::candidates`].
-#[inline]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn candidates(block: &Block, shear: &Shear) -> ([__m128; 3], u32) {
-    let [kx, ky, kz] = shear.axes;
-    let [ox, oy, oz] = shear.origin.map(|o| _mm_set1_ps(o));
-    let [sx, sy] = shear.scale.map(|s| _mm_set1_ps(s));
-    let [(x0, y0), (x1, y1), (x2, y2)] = [0, 1, 2].map(|corner| {
-        // SAFETY: the axes of a `Shear` are below 3.
-        let [x, y, z] = unsafe {
-            [
-                memory::coordinates(block, corner, kx),
-                memory::coordinates(block, corner, ky),
-                memory::coordinates(block, corner, kz),
-            ]
-        };
-        let depth = _mm_sub_ps(z, oz);
-        (
-            _mm_sub_ps(_mm_sub_ps(x, ox), _mm_mul_ps(sx, depth)),
-            _mm_sub_ps(_mm_sub_ps(y, oy), _mm_mul_ps(sy, depth)),
-        )
-    });
-    let a = _mm_sub_ps(_mm_mul_ps(x2, y1), _mm_mul_ps(y2, x1));
-    let b = _mm_sub_ps(_mm_mul_ps(x0, y2), _mm_mul_ps(y0, x2));
-    let c = _mm_sub_ps(_mm_mul_ps(x1, y0), _mm_mul_ps(y1, x0));
-    let zero = _mm_setzero_ps();
-    let positive = _mm_cmpge_ps(_mm_min_ps(_mm_min_ps(a, b), c), zero);
-    let negative = _mm_cmple_ps(_mm_max_ps(_mm_max_ps(a, b), c), zero);
-    let lanes = _mm_movemask_ps(_mm_or_ps(positive, negative)) as u32;
-    ([a, b, c], lanes)
-}
-
-/// Drops what is entered beyond the nearest hit from the stack, in order.
+/// Drops what is entered beyond the nearest hit from the stack, in order. Two times eight entries a
+/// turn: more are rare, so that the loop's branch is predicted.
 ///
 /// # Safety
-/// `slot.pending + 8` is at most the capacity of the stack.
+/// `slot.pending + 16` is at most the capacity of the stack.
 #[inline]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
 unsafe fn compact(slot: &mut Slot<'_>) {
+    let (mut kept, mut at) = (0, 0);
+    while at < slot.pending {
+        // SAFETY: the caller's promise; `at` is below `pending`, and `kept` at most `at`.
+        unsafe {
+            kept = compact_eight(slot, kept, at);
+            kept = compact_eight(slot, kept, at + 8);
+        }
+        at += 16;
+    }
+    slot.pending = kept;
+}
+
+/// Moves those of the eight entries from `at` on that remain to `kept`, and says where they end.
+///
+/// # Safety
+/// `at + 8` is at most the capacity of the stack, and `kept` at most `at`.
+#[inline]
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+unsafe fn compact_eight(slot: &Slot<'_>, kept: usize, at: usize) -> usize {
     // Distances are not negative, so that their bits compare as they do.
     let nearest = _mm256_set1_epi32(slot.nearest.to_bits() as i32);
     let entry = _mm256_set1_epi32(!LANE_BITS as i32);
-    let mut kept = 0;
-    let mut at = 0;
-    while at < slot.pending {
-        // SAFETY: `at` is below `pending`.
-        let (children, keys) = unsafe { slot.stack.load(at) };
-        let beyond = _mm256_cmpgt_epi32(_mm256_and_si256(keys, entry), nearest);
-        let beyond = _mm256_movemask_ps(_mm256_castsi256_ps(beyond)) as u32;
-        let valid = (1u32 << (slot.pending - at).min(8)) - 1;
-        let keep = !beyond & valid;
-        let order = COMPACTION.order(keep as usize);
-        // SAFETY: `kept` is at most `at`. What is overwritten has been read.
-        unsafe {
-            slot.stack
-                .store_children(kept, _mm256_permutevar8x32_epi32(children, order));
-            slot.stack
-                .store_keys(kept, _mm256_permutevar8x32_epi32(keys, order));
-        }
-        kept += keep.count_ones() as usize;
-        at += 8;
+    // SAFETY: the caller's promise.
+    let (children, keys) = unsafe { slot.stack.load(at) };
+    let beyond = _mm256_cmpgt_epi32(_mm256_and_si256(keys, entry), nearest);
+    let beyond = _mm256_movemask_ps(_mm256_castsi256_ps(beyond)) as u32;
+    let valid = (1u32 << slot.pending.saturating_sub(at).min(8)) - 1;
+    let keep = !beyond & valid;
+    let order = COMPACTION.order(keep as usize);
+    // SAFETY: `kept` is at most `at`. What is overwritten has been read.
+    unsafe {
+        slot.stack
+            .store_children(kept, _mm256_permutevar8x32_epi32(children, order));
+        slot.stack
+            .store_keys(kept, _mm256_permutevar8x32_epi32(keys, order));
     }
-    slot.pending = kept;
+    kept + keep.count_ones() as usize
 }
