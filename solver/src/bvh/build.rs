@@ -8,7 +8,8 @@
 //!
 //! On a regular, axis-aligned tessellation, which is what rooms are made of, equal merge costs
 //! make PLOC's trees three to ten times slower to traverse. The boxes that it sees are therefore
-//! enlarged by a random 1e-3 of the triangle's size; [`Binary`] then holds the true boxes again.
+//! enlarged by a random 1e-3 of the triangle's size; [`Binary`] then holds the true boxes again,
+//! padded by what rounding needs.
 
 use crate::geometry::{Geometry, TriangleId};
 use crate::sampling::{Stage, hash};
@@ -25,10 +26,15 @@ const JITTER: f32 = 1e-3;
 /// rays; zero makes rays 3–10 % slower.
 const REINSERTION: f32 = 0.15;
 
-/// Padding of every box in the unit frame: it covers the rounding of the watertight test, whose
-/// sheared coordinates carry errors of a few ε = 2⁻²⁴ of the distance between corner and ray
-/// origin (at most about 4 for origins within twice the scene's bounds).
-pub(super) const PADDING: f32 = 16.0 / 16_777_216.0;
+/// Padding of a triangle's box in units of its longest side.
+///
+/// The watertight test works on corners sheared to the ray, x = (Pₓ − oₓ) − sₓ (P_z − o_z). With
+/// |sₓ| ≤ 1 the roundings amount to at most 5ε (|Pₓ − oₓ| + E), and those of the edge functions to
+/// a few ε E, for a triangle of extent E and ε = 2⁻²⁴. A ray that the test accepts therefore passes
+/// its box, along each axis, within some 10ε E and 5ε of the distance along that axis. The first is
+/// this padding; the second is in the slacks of `slabs`. A padding by the size of the scene instead
+/// would hold the origins of all rays that leave a surface in its boxes, and slow them by half.
+const PADDING: f32 = 16.0 / 16_777_216.0;
 
 /// A box in f32.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +53,15 @@ impl Bounds {
         Self {
             lower: self.lower.min(other.lower),
             upper: self.upper.max(other.upper),
+        }
+    }
+
+    /// Enlarged by [`PADDING`], and by no less than one ulp, so that rounding does not undo it.
+    fn padded(self) -> Self {
+        let padding = Vec3::splat(PADDING * (self.upper - self.lower).max_element());
+        Self {
+            lower: (self.lower - padding).map(f32::next_down),
+            upper: (self.upper + padding).map(f32::next_up),
         }
     }
 
@@ -109,7 +124,8 @@ impl Binary {
         Some(Self::flatten(&tree, &boxes))
     }
 
-    /// Puts the nodes of obvhs into depth-first order and refits them to the true boxes.
+    /// Puts the nodes of obvhs into depth-first order and refits them to the true boxes,
+    /// padded.
     fn flatten(tree: &obvhs::bvh2::Bvh2, boxes: &[Bounds]) -> Self {
         let mut content = Vec::with_capacity(tree.nodes.len());
         let mut bounds = Vec::with_capacity(tree.nodes.len());
@@ -125,7 +141,7 @@ impl Binary {
             if node.is_leaf() {
                 let triangle = tree.primitive_indices[first];
                 content.push(Content::Leaf(TriangleId(triangle)));
-                bounds.push(boxes[triangle as usize]);
+                bounds.push(boxes[triangle as usize].padded());
             } else {
                 content.push(Content::Pair(0, 0));
                 bounds.push(Bounds::EMPTY);

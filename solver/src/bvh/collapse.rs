@@ -8,7 +8,7 @@
 //! Source: H. Ylitie, T. Karras, S. Laine, "Efficient Incoherent Ray Traversal on GPUs Through
 //! Compressed Wide BVHs", HPG 2017, §3. Cost: about 0.5 µs a triangle.
 
-use super::build::{Binary, Content, PADDING};
+use super::build::{Binary, Content};
 use super::node::{BLOCK, Block, Child, Node, WIDTH};
 use crate::geometry::{Geometry, TriangleId};
 
@@ -73,8 +73,8 @@ pub(super) fn collapse(binary: &Binary, geometry: &Geometry) -> Wide {
             let target = &mut wide.nodes[node];
             target.children[lane] = child;
             for axis in 0..3 {
-                target.planes[2 * axis][lane] = bounds.lower[axis] - PADDING;
-                target.planes[2 * axis + 1][lane] = bounds.upper[axis] + PADDING;
+                target.planes[2 * axis][lane] = bounds.lower[axis];
+                target.planes[2 * axis + 1][lane] = bounds.upper[axis];
             }
         }
         pending.extend(inner.into_iter().rev());

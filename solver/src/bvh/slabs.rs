@@ -1,8 +1,9 @@
 //! Rays against the eight boxes of a node.
 //!
-//! A box is met where max over axes of (near − o) / d ≤ min over axes of (far − o) / d. Far
-//! distances are enlarged by 1 + 4ε (T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013), and the
-//! boxes are padded when the tree is built, so that rounding never misses one.
+//! A box is met where max over axes of (near − o) / d ≤ min over axes of (far − o) / d. Both sides
+//! are moved apart by 1 ∓ 16ε (as T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013, does with the
+//! far one), which covers the roundings here and those of the triangle test that grow with the
+//! distance; those that grow with the triangle are in the padding of the boxes.
 //!
 //! The entry distance is rounded towards zero by three bits, which the kernel needs for the number
 //! of the lane. Rounding is monotone: a box inside another has no smaller entry, and is never met
@@ -18,8 +19,9 @@ use super::node::{Node, WIDTH};
 use super::ray::Ray;
 use glam::Vec3;
 
-/// 1 + 4ε with ε = 2⁻²⁴: covers the three roundings of a slab distance.
-pub(super) const FAR_SLACK: f32 = 1.0 + 4.0 / 16_777_216.0;
+/// 1 ∓ 16ε with ε = 2⁻²⁴, for the near and the far side: three roundings of a slab distance, one of
+/// the product, and five of the triangle test, in all less than 10ε.
+pub(super) const SLACK: [f32; 2] = [1.0 - 16.0 / 16_777_216.0, 1.0 + 16.0 / 16_777_216.0];
 
 /// Bits of an entry distance that are cleared: enough for the number of a lane.
 pub(super) const LANE_BITS: u32 = WIDTH as u32 - 1;
@@ -65,8 +67,8 @@ impl Slabs {
             let far = &node.planes[self.near[axis] ^ 1];
             let (origin, reciprocal) = (self.origin[axis], self.reciprocal[axis]);
             for lane in 0..WIDTH {
-                let first = (near[lane] - origin) * reciprocal;
-                let second = (far[lane] - origin) * reciprocal * FAR_SLACK;
+                let first = (near[lane] - origin) * reciprocal * SLACK[0];
+                let second = (far[lane] - origin) * reciprocal * SLACK[1];
                 enter[lane] = if first > enter[lane] {
                     first
                 } else {

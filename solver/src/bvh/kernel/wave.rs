@@ -22,7 +22,7 @@ use super::setup::Setup;
 use crate::bvh::collapse::Wide;
 use crate::bvh::node::{BLOCK, Child, Node};
 use crate::bvh::ray::{Hit, Ray};
-use crate::bvh::slabs::{FAR_SLACK, LANE_BITS};
+use crate::bvh::slabs::{LANE_BITS, SLACK};
 use crate::bvh::triangle::{self, Shear};
 use std::arch::x86_64::*;
 
@@ -189,14 +189,10 @@ unsafe fn entries(node: &Node, slot: &Slot<'_>) -> (__m256i, __m256) {
             slab(node, slot, 2),
         )
     };
-    let enter = _mm256_max_ps(
-        _mm256_max_ps(_mm256_max_ps(ex, ey), ez),
-        _mm256_set1_ps(slot.setup.tmin),
-    );
-    let leave = _mm256_mul_ps(
-        _mm256_min_ps(_mm256_min_ps(lx, ly), lz),
-        _mm256_set1_ps(FAR_SLACK),
-    );
+    let [nearer, farther] = [_mm256_set1_ps(SLACK[0]), _mm256_set1_ps(SLACK[1])];
+    let enter = _mm256_mul_ps(_mm256_max_ps(_mm256_max_ps(ex, ey), ez), nearer);
+    let enter = _mm256_max_ps(enter, _mm256_set1_ps(slot.setup.tmin));
+    let leave = _mm256_mul_ps(_mm256_min_ps(_mm256_min_ps(lx, ly), lz), farther);
     let leave = _mm256_min_ps(leave, _mm256_set1_ps(slot.nearest));
     let enter = _mm256_and_si256(
         _mm256_castps_si256(enter),
