@@ -166,14 +166,20 @@ fn cosine_rays(geometry: &Geometry, per_point: u64) -> Vec<Ray> {
         .collect()
 }
 
-/// Segments between points of surfaces.
+/// Segments between points of surfaces that face each other, as shadow rays do.
 pub(crate) fn shadow(geometry: &Geometry) -> Vec<Ray> {
-    (0..RAYS)
-        .map(|i| {
-            let (origin, _) = surface_point(geometry, 2 * i + 1);
-            let (target, _) = surface_point(geometry, 2 * i + 2);
-            Ray::segment(origin, target)
+    /// Least cosine at either end.
+    const FACING: f32 = 0.02;
+    (0..)
+        .filter_map(|i| {
+            let (origin, at_origin) = surface_point(geometry, 2 * i + 1);
+            let (target, at_target) = surface_point(geometry, 2 * i + 2);
+            let direction = (target - origin).normalize();
+            let facing = at_origin.to_world(Vec3::Z).dot(direction) > FACING
+                && at_target.to_world(Vec3::Z).dot(-direction) > FACING;
+            facing.then(|| Ray::segment(origin, target))
         })
+        .take(RAYS as usize)
         .collect()
 }
 

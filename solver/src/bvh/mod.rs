@@ -10,6 +10,7 @@ mod collapse;
 mod kernel;
 mod node;
 mod ray;
+mod reinsertion;
 mod slabs;
 mod traverse;
 mod triangle;
@@ -26,7 +27,7 @@ pub struct Bvh {
 }
 
 impl Bvh {
-    /// Builds the hierarchy on one thread: the same bytes at any thread count.
+    /// Builds the hierarchy: the same bytes at any thread count.
     pub fn build(geometry: &Geometry) -> Self {
         let wide = build::Binary::build(geometry).map(|tree| collapse::collapse(&tree, geometry));
         Self { wide }
