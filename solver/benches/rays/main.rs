@@ -1,7 +1,6 @@
 //! Rays per second of the batch interface: camera rays, diffuse rays (64 from a point, and each from
 //! a point of its own) and shadow rays, in a bare room of 12 triangles, an office, a tessellated room
-//! of 100 000 and a cluttered hall of a million; by the processor's kernel, by its packets where rays
-//! are coherent, and by the portable twin.
+//! of 100 000 and a cluttered hall of a million; by the processor's kernel and by the portable twin.
 //!
 //! Before the times, each scene prints its error: how many rays from inside the closed scene leak,
 //! of rays in general position and of rays aimed exactly at edges and corners.
@@ -23,9 +22,8 @@ const BATCH: usize = 1024;
 type ClosestHits = fn(&Bvh, &[Ray], &mut [Hit]);
 type Occluded = fn(&Bvh, &[Ray], &mut [bool]);
 
-const CLOSEST: [(&str, ClosestHits); 3] = [
+const CLOSEST: [(&str, ClosestHits); 2] = [
     ("wave", Bvh::closest_hits),
-    ("packet", Bvh::closest_hits_coherent),
     ("portable", Bvh::closest_hits_portable),
 ];
 const OCCLUDED: [(&str, Occluded); 2] = [
@@ -55,9 +53,6 @@ fn bench_closest(
     let mut hits = vec![Hit::MISS; rays.len()];
     group.throughput(Throughput::Elements(rays.len() as u64));
     for (kernel, trace) in CLOSEST {
-        if kernel == "packet" && set != "camera" {
-            continue;
-        }
         let id = BenchmarkId::new(format!("{set}/{kernel}"), scene);
         group.bench_function(id, |bencher| {
             bencher.iter(|| batches(rays, &mut hits, |rays, hits| trace(bvh, rays, hits)));
@@ -93,7 +88,7 @@ fn bench(criterion: &mut Criterion) {
             group.bench_function(id, |bencher| {
                 bencher.iter(|| {
                     batches(&shadow, &mut blocked, |rays, blocked| {
-                        trace(&bvh, rays, blocked)
+                        trace(&bvh, rays, blocked);
                     });
                 });
             });

@@ -175,7 +175,7 @@ impl Binary {
 
     /// The subtree below a node of obvhs.
     fn subtree(tree: &Bvh2, boxes: &[Bounds], root: usize) -> Self {
-        let mut subtree = Self::with_capacity(0);
+        let mut subtree = Self::with_capacity(boxes.len() >> (CUT - 1));
         // (node of obvhs, parent here if this is its second child)
         let mut stack = vec![(root, None)];
         while let Some((source, second_child_of)) = stack.pop() {

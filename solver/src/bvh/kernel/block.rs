@@ -1,20 +1,60 @@
 //! The watertight test of a block: the operations of `triangle` in their order, on four lanes at
-//! once, distances to planes in f64 included.
+//! once, distances to planes in f64 included. What is rare is left to `triangle::nearest`.
 
 use super::memory;
 use super::setup::Setup;
 use crate::bvh::node::{BLOCK, Block};
-use crate::bvh::triangle::Point;
+use crate::bvh::ray::{Hit, Ray};
+use crate::bvh::triangle::{self, Point, Shear};
 use std::arch::x86_64::*;
 
+/// What the hits of a block change.
+pub(super) struct LeafHit<'a> {
+    /// Where the ray enters the block's box.
+    pub(super) entry: f32,
+    /// The nearest hit so far, or the largest distance that counts.
+    pub(super) nearest: &'a mut f32,
+    pub(super) best: &'a mut Hit,
+}
+
+impl LeafHit<'_> {
+    /// Intersects a block; true when there is a hit that counts.
+    #[inline]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+    pub(super) fn update(&mut self, block: &Block, setup: &Setup, ray: &Ray) -> bool {
+        let edges = edges(block, setup);
+        let inside = edges.inside();
+        if _mm_movemask_ps(inside) == 0 {
+            return false;
+        }
+        let limits = [self.entry, *self.nearest];
+        let Some(points) = points(block, setup, &edges, inside, limits) else {
+            let shear = Shear::new(ray);
+            let limits = [ray.tmin, self.entry];
+            return triangle::nearest(block, &shear, limits, self.nearest, self.best);
+        };
+        let mut lanes = points.lanes;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % BLOCK;
+            lanes &= lanes - 1;
+            let (point, id) = (points.point(lane), block.triangles[lane]);
+            if point.t <= *self.nearest && self.best.is_replaced_by(&point, *self.nearest, id) {
+                *self.nearest = point.t;
+                *self.best = Hit::new(point, id);
+            }
+        }
+        points.lanes != 0
+    }
+}
+
 /// Edge functions of four triangles.
-pub(super) struct Edges([__m128; 3]);
+struct Edges([__m128; 3]);
 
 impl Edges {
     /// A mask of the lanes whose edge functions do not differ in sign.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    pub(super) fn inside(&self) -> __m128 {
+    fn inside(&self) -> __m128 {
         let [a, b, c] = self.0;
         let zero = _mm_setzero_ps();
         let positive = _mm_cmpge_ps(_mm_min_ps(_mm_min_ps(a, b), c), zero);
@@ -41,7 +81,7 @@ fn corners(block: &Block, setup: &Setup, k: usize) -> [__m128; 3] {
 /// As `triangle::edges`.
 #[inline]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-pub(super) fn edges(block: &Block, setup: &Setup) -> Edges {
+fn edges(block: &Block, setup: &Setup) -> Edges {
     let [ox, oy, oz, _] = setup.shear_origin;
     let [sx, sy, ..] = setup.scale;
     let [ox, oy, oz] = [_mm_set1_ps(ox), _mm_set1_ps(oy), _mm_set1_ps(oz)];
@@ -68,8 +108,8 @@ pub(super) fn edges(block: &Block, setup: &Setup) -> Edges {
 }
 
 /// Points of four triangles; `lanes` are the bits of those that count.
-pub(super) struct Points {
-    pub(super) lanes: u32,
+struct Points {
+    lanes: u32,
     t: [f32; BLOCK],
     u: [f32; BLOCK],
     v: [f32; BLOCK],
@@ -77,7 +117,7 @@ pub(super) struct Points {
 
 impl Points {
     #[inline]
-    pub(super) fn point(&self, lane: usize) -> Point {
+    fn point(&self, lane: usize) -> Point {
         let lane = lane % BLOCK;
         Point {
             t: self.t[lane],
@@ -91,7 +131,7 @@ impl Points {
 /// edge function that is zero, or a ray in the plane.
 #[inline]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-pub(super) fn points(
+fn points(
     block: &Block,
     setup: &Setup,
     Edges([a, b, c]): &Edges,

@@ -14,15 +14,16 @@ pub(super) const PLANE: usize = WIDTH * size_of::<f32>();
 /// references that come from it may be followed.
 #[derive(Clone, Copy)]
 pub(super) struct Tree<'a> {
-    /// Where nodes, and where blocks begin.
-    bases: [*const u8; 2],
+    nodes: *const Node,
+    blocks: *const Block,
     lifetime: PhantomData<&'a Wide>,
 }
 
 impl<'a> Tree<'a> {
     pub(super) fn new(wide: &'a Wide) -> Self {
         Self {
-            bases: [wide.nodes.as_ptr().cast(), wide.blocks.as_ptr().cast()],
+            nodes: wide.nodes.as_ptr(),
+            blocks: wide.blocks.as_ptr(),
             lifetime: PhantomData,
         }
     }
@@ -35,7 +36,7 @@ impl<'a> Tree<'a> {
     pub(super) unsafe fn node(&self, child: Child) -> &'a Node {
         debug_assert!(!child.is_block());
         // SAFETY: the caller's promise, and the check of all references when the tree was built.
-        unsafe { &*self.bases[0].cast::<Node>().add(child.index()) }
+        unsafe { &*self.nodes.add(child.index()) }
     }
 
     /// The block of a reference.
@@ -46,7 +47,7 @@ impl<'a> Tree<'a> {
     pub(super) unsafe fn block(&self, child: Child) -> &'a Block {
         debug_assert!(child.is_block());
         // SAFETY: the caller's promise, and the check of all references when the tree was built.
-        unsafe { &*self.bases[1].cast::<Block>().add(child.index()) }
+        unsafe { &*self.blocks.add(child.index()) }
     }
 
     /// Asks for the cache lines of a node or block. By table, because a branch on what comes next
@@ -55,8 +56,9 @@ impl<'a> Tree<'a> {
     pub(super) fn prefetch(&self, child: Child) {
         const SIZES: [usize; 2] = [size_of::<Node>(), size_of::<Block>()];
         const LINE: usize = 64;
+        let bases: [*const u8; 2] = [self.nodes.cast(), self.blocks.cast()];
         let kind = usize::from(child.is_block());
-        let address = self.bases[kind].wrapping_add(child.index() * SIZES[kind]);
+        let address = bases[kind].wrapping_add(child.index() * SIZES[kind]);
         for line in 0..size_of::<Node>() / LINE {
             let address = address.wrapping_add(line * LINE).cast();
             // SAFETY: a prefetch has no effect but on the cache and never faults.

@@ -29,8 +29,8 @@ impl Compaction {
     #[inline]
     #[target_feature(enable = "avx2")]
     pub(super) fn order(&self, mask: usize) -> __m256i {
-        let lanes = u64::from_le_bytes(self.0[mask % 256]);
-        _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(lanes as i64))
+        let lanes = i64::from_le_bytes(self.0[mask % 256]);
+        _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(lanes))
     }
 }
 

@@ -52,14 +52,14 @@ impl Setup {
         let reciprocal = _mm_div_ps(_mm_set1_ps(1.0), direction);
         let reciprocal = _mm_blendv_ps(reciprocal, large, small);
         let negative = _mm_srli_epi32::<31>(_mm_castps_si128(reciprocal));
-        let plane = PLANE as i32;
+        let plane = (PLANE as u32).cast_signed();
         let near = _mm_add_epi32(
             _mm_setr_epi32(0, 2 * plane, 4 * plane, 0),
             _mm_mullo_epi32(negative, _mm_set1_epi32(plane)),
         );
 
         let [mx, my, mz] = ray.direction.abs().to_array();
-        let x_is_longest = (mx >= my) & (mx >= mz);
+        let x_is_longest = mx >= my && mx >= mz;
         let longest = if x_is_longest {
             0
         } else {

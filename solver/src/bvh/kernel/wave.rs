@@ -15,15 +15,14 @@
 //! Cost: about 1000 instructions a diffuse ray in a furnished room. Measured: sixteen rays are as
 //! good as 12 or 32; one block a leaf step and the prefetch by table are worth a third.
 
-use super::block;
+use super::block::LeafHit;
 use super::memory::{self, Stack, StackMemory, Tree};
 use super::order::{COMPACTION, sorted_descending};
 use super::setup::Setup;
 use crate::bvh::collapse::Wide;
-use crate::bvh::node::{BLOCK, Child, Node};
+use crate::bvh::node::{Child, Node};
 use crate::bvh::ray::{Hit, Ray};
 use crate::bvh::slabs::{LANE_BITS, SLACK};
-use crate::bvh::triangle::{self, Shear};
 use std::arch::x86_64::*;
 
 /// Rays in flight.
@@ -196,7 +195,7 @@ unsafe fn entries(node: &Node, slot: &Slot<'_>) -> (__m256i, __m256) {
     let leave = _mm256_min_ps(leave, _mm256_set1_ps(slot.nearest));
     let enter = _mm256_and_si256(
         _mm256_castps_si256(enter),
-        _mm256_set1_epi32(!LANE_BITS as i32),
+        _mm256_set1_epi32((!LANE_BITS).cast_signed()),
     );
     let missed = _mm256_cmp_ps::<_CMP_NLE_UQ>(_mm256_castsi256_ps(enter), leave);
     (enter, missed)
@@ -250,49 +249,25 @@ unsafe fn node_step<const ANY: bool>(tree: &Tree<'_>, slot: &mut Slot<'_>) {
 unsafe fn leaf_step<const ANY: bool>(tree: &Tree<'_>, slot: &mut Slot<'_>, ray: &Ray) -> bool {
     // SAFETY: the caller's promise.
     let block = unsafe { tree.block(slot.current) };
-    let edges = block::edges(block, &slot.setup);
-    let inside = edges.inside();
-    if _mm_movemask_ps(inside) != 0 {
-        let entry = if ANY {
-            // It decides nothing for an answer without a distance.
-            0.0
-        } else {
-            // SAFETY: the key of `current` is still where it was popped from.
-            let key = unsafe { slot.stack.key(slot.pending) };
-            f32::from_bits(key as u32 & !LANE_BITS)
-        };
-        let before = slot.nearest;
-        match block::points(block, &slot.setup, &edges, inside, [entry, before]) {
-            Some(points) => {
-                let mut lanes = points.lanes;
-                if ANY && lanes != 0 {
-                    return true;
-                }
-                while lanes != 0 {
-                    let lane = lanes.trailing_zeros() as usize;
-                    lanes &= lanes - 1;
-                    let (point, id) = (points.point(lane), block.triangles[lane % BLOCK]);
-                    if point.t <= slot.nearest && slot.best.is_replaced_by(&point, slot.nearest, id)
-                    {
-                        slot.nearest = point.t;
-                        slot.best = Hit::new(point, id);
-                    }
-                }
-            }
-            None => {
-                let shear = Shear::new(ray);
-                let limits = [ray.tmin, entry];
-                let found =
-                    triangle::nearest(block, &shear, limits, &mut slot.nearest, &mut slot.best);
-                if ANY && found {
-                    return true;
-                }
-            }
+    let entry = if ANY {
+        // It decides nothing for an answer without a distance.
+        0.0
+    } else {
+        // SAFETY: the key of `current` is still where it was popped from.
+        let key = unsafe { slot.stack.key(slot.pending) };
+        f32::from_bits(key as u32 & !LANE_BITS)
+    };
+    let mut hit = LeafHit {
+        entry,
+        nearest: &mut slot.nearest,
+        best: &mut slot.best,
+    };
+    if hit.update(block, &slot.setup, ray) {
+        if ANY {
+            return true;
         }
-        if !ANY && slot.nearest < before {
-            // SAFETY: `pending` is below the capacity by sixteen or more.
-            unsafe { compact(slot) };
-        }
+        // SAFETY: `pending` is below the capacity by sixteen or more.
+        unsafe { compact(slot) };
     }
     // SAFETY: `pending` was at least one: a ray whose stack is empty has ended.
     unsafe { slot.pop() };
@@ -327,8 +302,8 @@ unsafe fn compact(slot: &mut Slot<'_>) {
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
 unsafe fn compact_eight(slot: &Slot<'_>, kept: usize, at: usize) -> usize {
     // Distances are not negative, so that their bits compare as they do.
-    let nearest = _mm256_set1_epi32(slot.nearest.to_bits() as i32);
-    let entry = _mm256_set1_epi32(!LANE_BITS as i32);
+    let nearest = _mm256_set1_epi32(slot.nearest.to_bits().cast_signed());
+    let entry = _mm256_set1_epi32((!LANE_BITS).cast_signed());
     // SAFETY: the caller's promise.
     let (children, keys) = unsafe { slot.stack.load(at) };
     let beyond = _mm256_cmpgt_epi32(_mm256_and_si256(keys, entry), nearest);

@@ -68,12 +68,12 @@ fn scenes() -> Vec<(&'static str, Scene)> {
 /// A ray of one of sixteen kinds, among them all that have been trouble to somebody.
 fn ray(geometry: &Geometry, i: u64) -> Ray {
     let id = TriangleId((random(i, 40) * geometry.len() as f64) as u32);
-    let [a, b, c] = geometry.triangle(id).map(|p| p.as_vec3());
+    let [a, b, c] = geometry.triangle(id).map(|p: DVec3| p.as_vec3());
     let (u, v) = (random(i, 41) as f32, random(i, 42) as f32);
     let on_surface = a + (b - a) * u * 0.5 + (c - a) * v * 0.5;
     let near = (random_point(i, 43) - 0.5).as_vec3();
     let direction = random_direction(i);
-    let axis = Vec3::AXES[(i / 16 % 3) as usize] * if i % 2 == 0 { 1.0 } else { -1.0 };
+    let axis = Vec3::AXES[(i / 16 % 3) as usize] * if i.is_multiple_of(2) { 1.0 } else { -1.0 };
     match i % 16 {
         0 => Ray::new(near, direction),
         1 => Ray::new(near, axis),
@@ -118,22 +118,15 @@ fn assert_twins(name: &str, bvh: &Bvh, rays: &[Ray]) {
     bvh.closest_hits_portable(rays, &mut twins);
     bvh.occluded(rays, &mut blocked);
     bvh.occluded_portable(rays, &mut twins_blocked);
-    for coherent in [false, true] {
-        hits.fill(Hit::MISS);
-        if coherent {
-            bvh.closest_hits_coherent(rays, &mut hits);
-        } else {
-            bvh.closest_hits(rays, &mut hits);
-        }
-        for (index, (hit, twin)) in hits.iter().zip(&twins).enumerate() {
-            assert_eq!(
-                bits(hit),
-                bits(twin),
-                "{name}, coherent {coherent}: ray {index} of {}, {:?}",
-                rays.len(),
-                rays[index]
-            );
-        }
+    bvh.closest_hits(rays, &mut hits);
+    for (index, (hit, twin)) in hits.iter().zip(&twins).enumerate() {
+        assert_eq!(
+            bits(hit),
+            bits(twin),
+            "{name}: ray {index} of {}, {:?}",
+            rays.len(),
+            rays[index]
+        );
     }
     for (index, (hit, twin)) in blocked.iter().zip(&twins_blocked).enumerate() {
         assert_eq!(
@@ -174,8 +167,8 @@ fn batches_of_any_size_give_the_same_bits() {
     }
 }
 
-/// Rays of a camera, which the packets are for: through the whole of a view, so that the signs of
-/// directions and the longest axes change within it.
+/// Rays of a camera, through the whole of a view, so that the signs of directions and the longest
+/// axes change within it.
 #[test]
 fn camera_rays_give_the_same_bits() {
     let side = if cfg!(miri) { 4 } else { 97 };
@@ -233,14 +226,8 @@ fn rays_that_are_none_do_no_harm() {
     let mut blocked = vec![false; rays.len()];
     bvh.closest_hits_portable(&rays, &mut twins);
     bvh.occluded(&rays, &mut blocked);
-    for coherent in [false, true] {
-        if coherent {
-            bvh.closest_hits_coherent(&rays, &mut hits);
-        } else {
-            bvh.closest_hits(&rays, &mut hits);
-        }
-        for i in (0..rays.len()).step_by(3) {
-            assert_eq!(bits(&hits[i]), bits(&twins[i]));
-        }
+    bvh.closest_hits(&rays, &mut hits);
+    for i in (0..rays.len()).step_by(3) {
+        assert_eq!(bits(&hits[i]), bits(&twins[i]));
     }
 }
