@@ -4,6 +4,11 @@
 //! that need instructions the processor was found to have, memory without a check of bounds, and
 //! prefetches. All memory goes through [`memory`]. What the kernel must answer is what the portable
 //! traversal answers, bit by bit: `super::tests` compares them.
+//!
+//! Miri knows the instructions. With tree borrows, which rayon needs, and small scenes:
+//! `RUSTFLAGS="-C target-feature=+avx2,+bmi1,+bmi2,+lzcnt,+popcnt" RAYON_NUM_THREADS=1
+//! MIRIFLAGS="-Zmiri-disable-isolation -Zmiri-tree-borrows -Zmiri-ignore-leaks"
+//! cargo +nightly miri test -p luxel-solver --lib bvh::tests::twins::rays_that`.
 
 #![allow(
     unsafe_code,
