@@ -1,6 +1,6 @@
 //! Nodes of eight children and leaf blocks of four triangles, as structures of arrays.
 
-/// Children of a node and triangles of a block.
+/// Children of a node.
 pub(super) const WIDTH: usize = 8;
 /// Triangles of one leaf block.
 pub(super) const BLOCK: usize = 4;
@@ -10,9 +10,16 @@ const LEAF: u32 = 1 << 31;
 
 /// A reference to a child: a node or a leaf block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(transparent)]
 pub(super) struct Child(u32);
 
 impl Child {
+    /// The block without triangles that stands first in every tree: the child of empty lanes, and
+    /// what lies at the bottom of a stack.
+    pub(super) const NOTHING: Self = Self(LEAF);
+    /// The node that every ray starts at.
+    pub(super) const ROOT: Self = Self(0);
+
     pub(super) fn node(index: usize) -> Self {
         debug_assert!((index as u32) < LEAF, "a tree holds fewer than 2^31 nodes");
         Self(index as u32)
@@ -23,18 +30,31 @@ impl Child {
         Self(index as u32 | LEAF)
     }
 
+    #[inline]
     pub(super) fn is_block(self) -> bool {
         self.0 & LEAF != 0
     }
 
+    #[inline]
     pub(super) fn index(self) -> usize {
         (self.0 & !LEAF) as usize
+    }
+
+    /// The same reference in a tree that is appended to `nodes` nodes and `blocks` blocks.
+    pub(super) fn moved(self, nodes: usize, blocks: usize) -> Self {
+        if self == Self::NOTHING {
+            self
+        } else if self.is_block() {
+            Self::block(self.index() + blocks)
+        } else {
+            Self::node(self.index() + nodes)
+        }
     }
 }
 
 /// Eight boxes. `planes[2 * axis]` holds the lower, `planes[2 * axis + 1]` the upper planes; lanes
 /// without a child hold an empty box (lower +∞, upper −∞), which no ray meets.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(super) struct Node {
     pub(super) planes: [[f32; WIDTH]; 6],
@@ -51,7 +71,7 @@ impl Node {
             [f32::INFINITY; WIDTH],
             [f32::NEG_INFINITY; WIDTH],
         ],
-        children: [Child(0); WIDTH],
+        children: [Child::NOTHING; WIDTH],
     };
 }
 

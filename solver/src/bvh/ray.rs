@@ -1,5 +1,6 @@
 //! Rays and hits, in the unit frame.
 
+use super::triangle::Point;
 use crate::geometry::TriangleId;
 use glam::Vec3;
 
@@ -65,8 +66,17 @@ impl Hit {
         triangle: u32::MAX,
     };
 
-    pub(super) fn new(t: f32, u: f32, v: f32, triangle: u32) -> Self {
+    #[inline]
+    pub(super) fn new(point: Point, triangle: u32) -> Self {
+        let Point { t, u, v } = point;
         Self { t, u, v, triangle }
+    }
+
+    /// Whether a point of `triangle` at no more than `nearest` takes this hit's place, which is at
+    /// `nearest` unless it is a miss: when it is nearer, or as near with a lower id.
+    #[inline]
+    pub(super) fn is_replaced_by(&self, point: &Point, nearest: f32, triangle: u32) -> bool {
+        point.t < nearest || triangle < self.triangle
     }
 
     /// The triangle, or `None` for a miss.

@@ -1,5 +1,7 @@
 //! The tree against brute force, degenerate scenes first, and rays aimed at edges and corners.
 
+mod twins;
+
 use super::{Bvh, Hit, Ray};
 use crate::geometry::{Geometry, TriangleId};
 use crate::sampling::{Stage, hash, sphere};
@@ -231,4 +233,31 @@ fn axis_aligned_tessellation_gives_a_good_tree() {
         cost(0.0),
         cost(0.5)
     );
+}
+
+/// The tree is built in parallel, and is the same bytes at any thread count: also where many costs
+/// are equal.
+#[test]
+fn the_tree_does_not_depend_on_the_number_of_threads() {
+    for scene in [room(40, 0.0), soup(5000)] {
+        let geometry = Geometry::new(&scene);
+        let build = |threads: usize| {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("a pool of threads")
+                .install(|| Bvh::build(&geometry).wide.expect("triangles"))
+        };
+        let one = build(1);
+        for threads in [2, 3, 7] {
+            let other = build(threads);
+            assert_eq!(one.leaf_order, other.leaf_order, "{threads} threads");
+            assert!(one.nodes == other.nodes, "{threads} threads");
+            let triangles = |wide: &super::collapse::Wide| {
+                let blocks = wide.blocks.iter();
+                blocks.map(|block| block.triangles).collect::<Vec<_>>()
+            };
+            assert_eq!(triangles(&one), triangles(&other), "{threads} threads");
+        }
+    }
 }

@@ -1,24 +1,33 @@
-//! Rays per second of the batch interface: camera, diffuse and shadow rays in a bare room of 12
-//! triangles, a tessellated room of 100 000 and a cluttered hall of a million.
-//!
-//! Before the times, each scene prints its error: how many rays from inside the closed scene leak,
-//! of rays in general position and of rays aimed exactly at edges and corners.
-//!
-//! `cargo bench -p luxel-solver --bench rays`
+//! Scenes and sets of rays.
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DVec3, Vec3};
-use luxel_scenes::{Material, MaterialId, ObjectId, Reflectance, Scene};
-use luxel_solver::bvh::{Bvh, Hit, Ray};
+use luxel_scenes::{Material, MaterialId, ObjectId, Reflectance, Scene, load};
+use luxel_solver::bvh::Ray;
 use luxel_solver::geometry::{Geometry, TriangleId, ray_origin};
 use luxel_solver::sampling::{Frame, Stage, cosine_hemisphere, hash};
+use std::path::Path;
 
 /// Rays of each set.
-const RAYS: u64 = 1 << 15;
+pub(crate) const RAYS: u64 = 1 << 15;
 /// Rays that leave one point in the diffuse set, as in a row or a gather.
 const PER_POINT: u64 = 64;
-/// Rays of one call.
-const BATCH: usize = 1024;
+
+/// A bare room, a tessellated room of 100 000 triangles, a cluttered hall of a million, an office.
+pub(crate) fn scenes() -> Vec<(&'static str, Scene)> {
+    vec![
+        ("12", room(1)),
+        ("office", office()),
+        ("100k", room(91)),
+        ("1M", hall(83_300)),
+    ]
+}
+
+fn office() -> Scene {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/data");
+    load(data.join("office/office.toml"))
+        .expect("an example scene")
+        .scene
+}
 
 fn random(index: u64, dimension: u64) -> f64 {
     hash::uniform(11, Stage::BVH, index, dimension)
@@ -109,7 +118,7 @@ fn hall(boxes: u64) -> Scene {
 }
 
 /// A ray origin on the front of the triangle numbered `index` among those of the room's shell.
-fn surface_point(geometry: &Geometry, index: u64) -> (Vec3, Frame, DVec3) {
+fn surface_point(geometry: &Geometry, index: u64) -> (Vec3, Frame) {
     let id = TriangleId((random(index, 20) * geometry.len() as f64) as u32);
     let (u, v) = (random(index, 21), random(index, 22));
     let (u, v) = if u + v > 1.0 {
@@ -121,10 +130,11 @@ fn surface_point(geometry: &Geometry, index: u64) -> (Vec3, Frame, DVec3) {
     let face = geometry.face(id);
     let normal = geometry.normal(face);
     let origin = ray_origin(position, normal, geometry.extent(face));
-    (origin, Frame::around(normal.as_vec3()), position)
+    (origin, Frame::around(normal.as_vec3()))
 }
 
-fn primary() -> Vec<Ray> {
+/// Rays of a pinhole camera, by rows.
+pub(crate) fn camera() -> Vec<Ray> {
     let side = (RAYS as f64).sqrt() as u64;
     let eye = Vec3::new(-0.31, 0.02, -0.17);
     (0..side * side)
@@ -136,28 +146,45 @@ fn primary() -> Vec<Ray> {
         .collect()
 }
 
-fn diffuse(geometry: &Geometry) -> Vec<Ray> {
+/// Cosine-distributed rays, 64 from each point.
+pub(crate) fn diffuse(geometry: &Geometry) -> Vec<Ray> {
+    cosine_rays(geometry, PER_POINT)
+}
+
+/// Cosine-distributed rays, each from a point of its own.
+pub(crate) fn random_diffuse(geometry: &Geometry) -> Vec<Ray> {
+    cosine_rays(geometry, 1)
+}
+
+fn cosine_rays(geometry: &Geometry, per_point: u64) -> Vec<Ray> {
     (0..RAYS)
         .map(|i| {
-            let (origin, frame, _) = surface_point(geometry, i / PER_POINT);
+            let (origin, frame) = surface_point(geometry, i / per_point);
             let u = [random(i, 30) as f32, random(i, 31) as f32];
             Ray::new(origin, frame.to_world(cosine_hemisphere::sample(u)))
         })
         .collect()
 }
 
-fn shadow(geometry: &Geometry) -> Vec<Ray> {
-    (0..RAYS)
-        .map(|i| {
-            let (origin, ..) = surface_point(geometry, 2 * i + 1);
-            let (target, ..) = surface_point(geometry, 2 * i + 2);
-            Ray::segment(origin, target)
+/// Segments between points of surfaces that face each other, as shadow rays do.
+pub(crate) fn shadow(geometry: &Geometry) -> Vec<Ray> {
+    /// Least cosine at either end.
+    const FACING: f32 = 0.02;
+    (0..)
+        .filter_map(|i| {
+            let (origin, at_origin) = surface_point(geometry, 2 * i + 1);
+            let (target, at_target) = surface_point(geometry, 2 * i + 2);
+            let direction = (target - origin).normalize();
+            let facing = at_origin.to_world(Vec3::Z).dot(direction) > FACING
+                && at_target.to_world(Vec3::Z).dot(-direction) > FACING;
+            facing.then(|| Ray::segment(origin, target))
         })
+        .take(RAYS as usize)
         .collect()
 }
 
 /// Rays from the middle part of the scene at corners and edges.
-fn stress(geometry: &Geometry) -> Vec<Ray> {
+pub(crate) fn stress(geometry: &Geometry) -> Vec<Ray> {
     (0..RAYS)
         .map(|i| {
             let id = TriangleId((random(i, 40) * geometry.len() as f64) as u32);
@@ -173,57 +200,3 @@ fn stress(geometry: &Geometry) -> Vec<Ray> {
         })
         .collect()
 }
-
-fn closest(bvh: &Bvh, rays: &[Ray], hits: &mut [Hit]) -> usize {
-    for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-        bvh.closest_hits(rays, hits);
-    }
-    hits.iter().filter(|hit| hit.triangle().is_none()).count()
-}
-
-fn bench(criterion: &mut Criterion) {
-    let scenes = [("12", room(1)), ("100k", room(91)), ("1M", hall(83_300))];
-    let mut group = criterion.benchmark_group("rays");
-    group.sample_size(10);
-    for (name, scene) in &scenes {
-        let geometry = Geometry::new(scene);
-        let start = std::time::Instant::now();
-        let bvh = Bvh::build(&geometry);
-        let seconds = start.elapsed().as_secs_f64();
-        let (primary, diffuse) = (primary(), diffuse(&geometry));
-        let (shadow, stress) = (shadow(&geometry), stress(&geometry));
-        let mut hits = vec![Hit::MISS; RAYS as usize];
-        let mut blocked = vec![false; RAYS as usize];
-        let leaks = [&primary, &diffuse, &stress].map(|rays| {
-            let leaks = closest(&bvh, rays, &mut hits[..rays.len()]);
-            format!("{leaks} of {}", rays.len())
-        });
-        println!(
-            "{name}: {} triangles, built in {seconds:.3} s; leaks: primary {}, diffuse {}, aimed at \
-             edges and corners {}",
-            geometry.len(),
-            leaks[0],
-            leaks[1],
-            leaks[2]
-        );
-        group.throughput(Throughput::Elements(primary.len() as u64));
-        group.bench_function(BenchmarkId::new("primary", name), |bencher| {
-            bencher.iter(|| closest(&bvh, &primary, &mut hits[..primary.len()]));
-        });
-        group.throughput(Throughput::Elements(RAYS));
-        group.bench_function(BenchmarkId::new("diffuse", name), |bencher| {
-            bencher.iter(|| closest(&bvh, &diffuse, &mut hits));
-        });
-        group.bench_function(BenchmarkId::new("shadow", name), |bencher| {
-            bencher.iter(|| {
-                for (rays, blocked) in shadow.chunks(BATCH).zip(blocked.chunks_mut(BATCH)) {
-                    bvh.occluded(rays, blocked);
-                }
-            });
-        });
-    }
-    group.finish();
-}
-
-criterion_group!(benches, bench);
-criterion_main!(benches);

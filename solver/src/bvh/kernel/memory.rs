@@ -1,0 +1,231 @@
+//! All that the kernel reads and writes without a check of bounds, in a few wrappers.
+
+use crate::bvh::collapse::Wide;
+use crate::bvh::node::{BLOCK, Block, Child, Node, WIDTH};
+use std::arch::x86_64::*;
+use std::marker::PhantomData;
+
+/// Bytes of one plane of a node.
+pub(super) const PLANE: usize = WIDTH * size_of::<f32>();
+
+/// Nodes and blocks without checks of bounds.
+///
+/// Every child reference in a [`Wide`] names a node or a block of it (`Wide::check`), so that
+/// references that come from it may be followed.
+#[derive(Clone, Copy)]
+pub(super) struct Tree<'a> {
+    nodes: *const Node,
+    blocks: *const Block,
+    lifetime: PhantomData<&'a Wide>,
+}
+
+impl<'a> Tree<'a> {
+    pub(super) fn new(wide: &'a Wide) -> Self {
+        Self {
+            nodes: wide.nodes.as_ptr(),
+            blocks: wide.blocks.as_ptr(),
+            lifetime: PhantomData,
+        }
+    }
+
+    /// The node of a reference.
+    ///
+    /// # Safety
+    /// `child` comes from this tree and names a node.
+    #[inline]
+    pub(super) unsafe fn node(&self, child: Child) -> &'a Node {
+        debug_assert!(!child.is_block());
+        // SAFETY: the caller's promise, and the check of all references when the tree was built.
+        unsafe { &*self.nodes.add(child.index()) }
+    }
+
+    /// The block of a reference.
+    ///
+    /// # Safety
+    /// `child` comes from this tree and names a block.
+    #[inline]
+    pub(super) unsafe fn block(&self, child: Child) -> &'a Block {
+        debug_assert!(child.is_block());
+        // SAFETY: the caller's promise, and the check of all references when the tree was built.
+        unsafe { &*self.blocks.add(child.index()) }
+    }
+
+    /// Asks for the cache lines of a node or block. By table, because a branch on what comes next
+    /// would be mispredicted half of the time.
+    #[inline]
+    pub(super) fn prefetch(&self, child: Child) {
+        const SIZES: [usize; 2] = [size_of::<Node>(), size_of::<Block>()];
+        const LINE: usize = 64;
+        let bases: [*const u8; 2] = [self.nodes.cast(), self.blocks.cast()];
+        let kind = usize::from(child.is_block());
+        let address = bases[kind].wrapping_add(child.index() * SIZES[kind]);
+        for line in 0..size_of::<Node>() / LINE {
+            let address = address.wrapping_add(line * LINE).cast();
+            // SAFETY: a prefetch has no effect but on the cache and never faults.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(address) };
+        }
+    }
+}
+
+/// Eight lanes of the plane at a byte offset in [`Node::planes`].
+///
+/// # Safety
+/// `offset` is the index of a plane times the size of one.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) unsafe fn planes(node: &Node, offset: usize) -> __m256 {
+    debug_assert!(offset.is_multiple_of(PLANE) && offset < size_of_val(&node.planes));
+    // SAFETY: the caller's promise; planes are 32 bytes each from the start of a node aligned by 64.
+    unsafe { _mm256_load_ps(node.planes.as_ptr().cast::<f32>().byte_add(offset)) }
+}
+
+/// The references of a node's children.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn children(node: &Node) -> __m256i {
+    // SAFETY: eight references of 32 bits, behind planes of 6 · 32 bytes in a node aligned by 64.
+    unsafe { _mm256_load_si256(node.children.as_ptr().cast()) }
+}
+
+/// The coordinates of four corners along an axis.
+///
+/// # Safety
+/// `corner` and `axis` are below 3.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) unsafe fn coordinates(block: &Block, corner: usize, axis: usize) -> __m128 {
+    debug_assert!(corner < 3 && axis < 3);
+    // SAFETY: the caller's promise; rows of 16 bytes in a block aligned by 32.
+    unsafe {
+        let first = block.corners.as_ptr().cast::<f32>();
+        _mm_load_ps(first.add((3 * corner + axis) * BLOCK))
+    }
+}
+
+/// Writes four lanes.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn store(target: &mut [f32; BLOCK], lanes: __m128) {
+    // SAFETY: an unaligned store of four floats into an array of four.
+    unsafe { _mm_storeu_ps(target.as_mut_ptr(), lanes) }
+}
+
+/// Writes four lanes of f64.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn store_f64(target: &mut [f64; 4], lanes: __m256d) {
+    // SAFETY: an unaligned store of four numbers into an array of four.
+    unsafe { _mm256_storeu_pd(target.as_mut_ptr(), lanes) }
+}
+
+/// Writes four lanes of integers.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn store_u32(target: &mut [u32; 4], lanes: __m128i) {
+    // SAFETY: an unaligned store of four numbers into an array of four.
+    unsafe { _mm_storeu_si128(target.as_mut_ptr().cast(), lanes) }
+}
+
+/// Reads four integers.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn load_axes(axes: &[u32; 4]) -> __m128i {
+    // SAFETY: an unaligned load of four numbers from an array of four.
+    unsafe { _mm_loadu_si128(axes.as_ptr().cast()) }
+}
+
+/// The memory of the stacks of several rays.
+pub(super) struct StackMemory {
+    children: Vec<Child>,
+    keys: Vec<i32>,
+    capacity: usize,
+}
+
+impl StackMemory {
+    /// `count` stacks for the paths through `wide`. On a path each node leaves at most seven
+    /// children behind; one entry lies at the bottom, and up to sixteen are read at a time.
+    pub(super) fn new(wide: &Wide, count: usize) -> Self {
+        let capacity = 1 + (WIDTH - 1) * wide.depth + 2 * WIDTH;
+        Self {
+            children: vec![Child::NOTHING; capacity * count],
+            keys: vec![0; capacity * count],
+            capacity,
+        }
+    }
+
+    /// The stacks, each with [`Child::NOTHING`] at the bottom.
+    pub(super) fn stacks(&mut self) -> impl Iterator<Item = Stack<'_>> {
+        let (children, keys) = (self.children.as_mut_ptr(), self.keys.as_mut_ptr());
+        let starts = (0..self.children.len()).step_by(self.capacity);
+        starts.map(move |start| Stack {
+            children: children.wrapping_add(start),
+            keys: keys.wrapping_add(start),
+            lifetime: PhantomData,
+        })
+    }
+}
+
+/// What one ray has still to visit: references, and their entry distances as bits with the number
+/// of a lane in the lowest three.
+#[derive(Clone, Copy)]
+pub(super) struct Stack<'a> {
+    children: *mut Child,
+    keys: *mut i32,
+    lifetime: PhantomData<&'a mut StackMemory>,
+}
+
+impl Stack<'_> {
+    /// # Safety
+    /// `at` is below the capacity.
+    #[inline]
+    pub(super) unsafe fn child(&self, at: usize) -> Child {
+        // SAFETY: the caller's promise.
+        unsafe { *self.children.add(at) }
+    }
+
+    /// # Safety
+    /// `at` is below the capacity.
+    #[inline]
+    pub(super) unsafe fn key(&self, at: usize) -> i32 {
+        // SAFETY: the caller's promise.
+        unsafe { *self.keys.add(at) }
+    }
+
+    /// References and keys from `at` on.
+    ///
+    /// # Safety
+    /// `at + 8` is at most the capacity.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    pub(super) unsafe fn load(&self, at: usize) -> (__m256i, __m256i) {
+        // SAFETY: the caller's promise; unaligned loads.
+        unsafe {
+            (
+                _mm256_loadu_si256(self.children.add(at).cast()),
+                _mm256_loadu_si256(self.keys.add(at).cast()),
+            )
+        }
+    }
+
+    /// Writes references from `at` on.
+    ///
+    /// # Safety
+    /// `at + 8` is at most the capacity.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    pub(super) unsafe fn store_children(&self, at: usize, children: __m256i) {
+        // SAFETY: the caller's promise; an unaligned store.
+        unsafe { _mm256_storeu_si256(self.children.add(at).cast(), children) }
+    }
+
+    /// Writes keys from `at` on.
+    ///
+    /// # Safety
+    /// `at + 8` is at most the capacity.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    pub(super) unsafe fn store_keys(&self, at: usize, keys: __m256i) {
+        // SAFETY: the caller's promise; an unaligned store.
+        unsafe { _mm256_storeu_si256(self.keys.add(at).cast(), keys) }
+    }
+}
