@@ -25,6 +25,15 @@ pub struct Budget {
     pub shadow_rays: usize,
 }
 
+/// Whether a budget may have another mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mesh {
+    /// As many patches as are cheapest.
+    Free,
+    /// The patches that there are: what rays were gathered stays.
+    Kept,
+}
+
 /// Rays of a patch's row in each solution. 64 measured no better per ray; 16 biases the near
 /// classes, whose rows are then often empty.
 pub const ROW_RAYS: usize = 32;
@@ -90,7 +99,11 @@ impl Budget {
 
     /// The cheapest budget for a relative error, from the errors that this one had.
     #[must_use]
-    pub fn for_error(self, error: f64, parts: &ErrorParts, receivers: usize) -> Self {
+    pub fn for_error(self, error: f64, parts: &ErrorParts, receivers: usize, mesh: Mesh) -> Self {
+        let patches = match mesh {
+            Mesh::Free => PATCHES,
+            Mesh::Kept => [self.patches; 2],
+        };
         let fewest = fewest_rays(receivers);
         let receivers = receivers as f64;
         let items = [
@@ -101,7 +114,7 @@ impl Budget {
                     (parts.mesh.powi(2), MESH_EXPONENT),
                 ],
                 cost: patch_cost(),
-                limits: PATCHES,
+                limits: patches,
             },
             Item {
                 spent: self.rays as f64,
@@ -172,7 +185,7 @@ pub fn fewest_rays(receivers: usize) -> usize {
 }
 
 /// As many for each replicate.
-fn even(rays: f64) -> usize {
+pub(super) fn even(rays: f64) -> usize {
     (rays as usize).next_multiple_of(MAX_REPLICATES)
 }
 
@@ -247,7 +260,7 @@ mod tests {
     #[test]
     fn the_budget_meets_the_error_and_no_cheaper_one_does() {
         for error in [0.02, 0.01, 0.005, 0.001] {
-            let best = SPENT.for_error(error, &PARTS, 1000);
+            let best = SPENT.for_error(error, &PARTS, 1000, Mesh::Free);
             // Rounding up to whole rays gains less than a hundredth.
             assert!(
                 (0.99 * error..=error).contains(&predicted(best)),
@@ -271,15 +284,24 @@ mod tests {
     }
 
     #[test]
+    fn a_mesh_that_is_kept_leaves_the_rest_to_rays() {
+        let kept = SPENT.for_error(0.01, &PARTS, 1000, Mesh::Kept);
+        assert_eq!(kept.patches, SPENT.patches);
+        assert!((0.0099..=0.01).contains(&predicted(kept)), "{kept:?}");
+        let free = SPENT.for_error(0.01, &PARTS, 1000, Mesh::Free);
+        assert!(kept.rays > free.rays && free.patches > kept.patches);
+    }
+
+    #[test]
     fn parts_without_error_cost_the_least_possible() {
         let none = ErrorParts::default();
-        let least = SPENT.for_error(0.01, &none, 10_000);
+        let least = SPENT.for_error(0.01, &none, 10_000, Mesh::Free);
         assert_eq!(
             (least.patches, least.rays, least.shadow_rays),
             (PATCHES[0], RAYS[0], SHADOW_RAYS[0])
         );
         // What cannot be reached is approached as far as it goes.
-        let most = SPENT.for_error(1e-9, &PARTS, 10);
+        let most = SPENT.for_error(1e-9, &PARTS, 10, Mesh::Free);
         assert_eq!(most.rays, RAYS[1]);
     }
 }

@@ -14,7 +14,9 @@
 
 mod budget;
 
-pub use budget::{Budget, ROW_RAYS, fewest_rays};
+use budget::even;
+
+pub use budget::{Budget, Mesh, ROW_RAYS, fewest_rays};
 
 use crate::gather::{
     Components, ErrorParts, GatherConfig, Key, Lookup, MAX_REPLICATES, SkyRays, Solutions, Tally,
@@ -26,15 +28,32 @@ use crate::radiosity::{self, RadiosityConfig, RadiositySolution};
 use crate::solvers::{Config, SystemError, Tolerance};
 use crate::world::{Receiver, World};
 
-/// How far below the error asked for the budget is planned. Smaller, and many runs need a second
-/// round; larger, and all pay for it.
+/// How far below the error asked for the budget is planned from a pilot, which knows its parts to a tenth
+/// or two, and from a gather at all receivers. Smaller, and many runs need one more round; larger, and all
+/// pay for it.
 const SAFETY: f64 = 1.25;
+const MARGIN: f64 = 1.15;
+
+/// Share of the planned gather rays that are cast first: the rest follows from what they tell. Smaller,
+/// and the second plan knows no more than the first; larger, and more rays are cast in vain.
+const FIRST_SHARE: f64 = 0.5;
+
+/// The largest growth of the gather rays in a round: where an error is out of reach no number suffices.
+const RAY_GROWTH: usize = 4;
+
+/// The largest growth of a mesh from one pilot to the next. The error of coarse meshes falls faster than
+/// any exponent says: a larger growth makes meshes twice as fine as they need to be.
+const MESH_GROWTH: usize = 4;
 
 /// Receivers of a pilot: their mean square error is then known to a tenth.
 const PILOT_RECEIVERS: usize = 128;
 
 /// A new mesh must be this much finer to be worth a new gather.
 const WORTHWHILE: f64 = 1.5;
+
+/// Share of the error asked for that mesh and solution may have before a gather is begun anew with a finer
+/// mesh. Smaller, and gathers are thrown away; larger, and the rest costs very many rays.
+const MESH_SHARE: f64 = 0.8;
 
 /// Rounds after which an error counts as out of reach: each doubles something.
 const MAX_ROUNDS: usize = 24;
@@ -207,26 +226,25 @@ impl<'w, 's> Adapted<'w, 's> {
         control: &mut dyn Control,
     ) -> Result<Option<(Lookup, Budget)>, PilotError> {
         let error = config.error / SAFETY;
-        let pilot = first_budget(self.world, error, sample.len().min(PILOT_RECEIVERS));
-        let Some(lookup) = self.solve(pilot.patches, control)? else {
-            return Ok(None);
-        };
+        let mut pilot = first_budget(self.world, error, sample.len().min(PILOT_RECEIVERS));
         let share = sample.len().div_ceil(PILOT_RECEIVERS).max(1);
         let sample: Vec<Receiver> = sample.iter().copied().step_by(share).collect();
-        let mut gathering = Gathering::new(self.world, &sample, gathers(count), config);
-        if !gathering.go_on(Some(&lookup), &pilot, Stage::Pilot, control) {
-            return Ok(None);
+        loop {
+            let Some(lookup) = self.solve(pilot.patches, control)? else {
+                return Ok(None);
+            };
+            let mut gathering = Gathering::new(self.world, &sample, gathers(count), config);
+            if !gathering.go_on(Some(&lookup), &pilot, Stage::Pilot, control) {
+                return Ok(None);
+            }
+            let parts = error_parts(&gathering.tallies);
+            let planned = plan(self.world, &pilot, error, &parts, count, Mesh::Free);
+            if planned.patches as f64 <= WORTHWHILE * pilot.patches as f64 {
+                let patches = pilot.patches;
+                return Ok(Some((lookup, Budget { patches, ..planned })));
+            }
+            pilot.patches = planned.patches.min(MESH_GROWTH * pilot.patches);
         }
-        let parts = error_parts(&gathering.tallies);
-        let planned = plan(self.world, &pilot, error, &parts, count);
-        let finer = planned.patches as f64 > WORTHWHILE * pilot.patches as f64;
-        let lookup = if finer {
-            self.solve(planned.patches, control)?
-        } else {
-            Some(lookup)
-        };
-        let patches = planned.patches.max(pilot.patches);
-        Ok(lookup.map(|lookup| (lookup, Budget { patches, ..planned })))
     }
 }
 
@@ -249,7 +267,12 @@ pub fn irradiance(
     if config.components != Components::Direct {
         let scene = adapted.insert(Adapted::new(world, config.seed)?);
         match scene.prepare(receivers, receivers.len(), config, control)? {
-            Some((solved, planned)) => (lookup, budget) = (Some(solved), planned),
+            Some((solved, planned)) => {
+                let fewest = first_budget(world, error, receivers.len()).rays;
+                let first = even(FIRST_SHARE * planned.rays as f64).max(fewest);
+                let rays = first.min(planned.rays);
+                (lookup, budget) = (Some(solved), Budget { rays, ..planned });
+            }
             None => return Ok(Adaptive::none()),
         }
     }
@@ -263,24 +286,30 @@ pub fn irradiance(
             result.ending = Ending::Reached;
             return Ok(result);
         }
+        error = error.max(config.error / MARGIN);
         // More is wanted than was planned for: half of what was reached.
         let total = result.parts.total();
         error = if total <= error { 0.5 * total } else { error };
         let count = receivers.len();
-        let planned = plan(world, &gathering.spent, error, &result.parts, count);
-        let finer = planned.patches as f64 > WORTHWHILE * budget.patches as f64;
-        let solved = match adapted.as_ref().filter(|_| finer) {
-            Some(scene) => scene.solve(planned.patches, control)?,
-            None => None,
-        };
-        let next = Budget {
-            patches: if solved.is_some() {
-                planned.patches
-            } else {
-                budget.patches
-            },
-            rays: planned.rays.max(gathering.spent.rays),
-            shadow_rays: planned.shadow_rays.max(gathering.spent.shadow_rays),
+        let plan = |mesh| plan(world, &gathering.spent, error, &result.parts, count, mesh);
+        let mut next = plan(Mesh::Kept);
+        // A new mesh begins a new gather: only where rays cannot make up for the old one.
+        let fixed = result.parts.solution.hypot(result.parts.mesh);
+        let mut solved = None;
+        if let Some(scene) = adapted.as_ref().filter(|_| fixed > MESH_SHARE * error) {
+            let free = plan(Mesh::Free);
+            if free.patches > budget.patches {
+                let worthwhile = (WORTHWHILE * budget.patches as f64) as usize;
+                let patches = free.patches.max(worthwhile);
+                next = Budget { patches, ..free };
+                solved = scene.solve(patches, control)?;
+            }
+        }
+        let spent = gathering.spent;
+        next = Budget {
+            patches: next.patches,
+            rays: next.rays.clamp(spent.rays, RAY_GROWTH * spent.rays),
+            shadow_rays: next.shadow_rays.max(spent.shadow_rays),
         };
         if next == gathering.spent {
             result.ending = Ending::OutOfReach;
@@ -355,8 +384,15 @@ fn first_budget(world: &World, error: f64, receivers: usize) -> Budget {
 }
 
 /// The next budget for an error, after one that had certain parts.
-fn plan(world: &World, spent: &Budget, error: f64, parts: &ErrorParts, receivers: usize) -> Budget {
-    let mut planned = spent.for_error(error, parts, receivers);
+fn plan(
+    world: &World,
+    spent: &Budget,
+    error: f64,
+    parts: &ErrorParts,
+    receivers: usize,
+    mesh: Mesh,
+) -> Budget {
+    let mut planned = spent.for_error(error, parts, receivers, mesh);
     if world.lights().has_sky() {
         let most = spent.shadow_rays * SKY_GROWTH;
         planned.shadow_rays = planned.shadow_rays.clamp(FIRST_SKY_RAYS, most);
