@@ -160,6 +160,7 @@ mod tests {
             gather: 0.004,
             solution: 0.002,
             mesh: 0.0,
+            spread: 0.0,
         };
         let stated = StatedError::of_gather(&parts, 0.0);
         let total = (1e-6_f64 + 16e-6 + 4e-6).sqrt();

@@ -10,8 +10,8 @@ use luxel_solver::adaptive::{Control, Stage};
 use luxel_solver::gather::ErrorParts;
 use std::time::{Duration, Instant};
 
-/// The estimate is known to a tenth or so (its noise comes from four replicates, its mesh part from
-/// one difference), and counts as reached when it is this factor better than asked for. Smaller, and
+/// The estimate of a film or a mesh is known to a tenth or so (its noise comes from four replicates, its mesh
+/// part from one difference), and counts as reached when it is this factor better than asked for. Smaller, and
 /// more than one run in twenty is worse than asked for; larger, and all pay for it.
 pub(super) const CONFIDENCE: f64 = 1.1;
 
@@ -158,7 +158,9 @@ impl Control for Steering<'_, '_> {
     }
 
     fn suits(&mut self, parts: &ErrorParts) -> bool {
-        self.judge(parts.total())
+        self.settle();
+        self.estimate = Some(parts.total());
+        self.goal.is_none_or(|goal| goal.is_met_by(parts.upper()))
     }
 }
 

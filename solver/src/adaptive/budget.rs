@@ -246,6 +246,7 @@ mod tests {
         gather: 0.03,
         solution: 0.003,
         mesh: 0.004,
+        spread: 0.0,
     };
 
     fn predicted(budget: Budget) -> f64 {
