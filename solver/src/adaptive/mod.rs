@@ -4,10 +4,12 @@
 //! 1. A mesh and four solutions are guessed from the error that is asked for ([`Budget::pilot`]).
 //! 2. Some of the receivers are gathered with few rays; the parts of their error
 //!    ([`ErrorParts`]) say what the cheapest sufficient budget is ([`Budget::for_error`]).
-//! 3. When more patches are due, the scene is meshed and solved anew.
-//! 4. All receivers are gathered; the parts of the error are measured again, on all of them, and the
-//!    dominant one is given more until the estimate suits. Gather rays are kept: their sequences go
-//!    on. A new mesh begins a new gather.
+//! 3. When more patches are due, the scene is meshed and solved anew, with at most four times as many, and
+//!    the pilot repeated.
+//! 4. All receivers are gathered with half of the rays; the parts of the error are measured again, on all of
+//!    them, and the missing rays follow from that until 19 of 20 such runs are within the error
+//!    ([`ErrorParts::upper`]). Gather rays are kept: their sequences go on. Only where rays cannot make up for
+//!    the mesh a new one is made, and begins a new gather.
 //!
 //! Every decision follows from sampled values, never from a clock, so that the result is the same at
 //! any thread count; a [`Control`] that measures time may end the work earlier.
