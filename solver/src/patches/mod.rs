@@ -5,7 +5,7 @@
 //! against the patch size are clustered in the order of the ray tree's leaves, so that the number
 //! of patches follows the light and not the triangle count. A hit finds its patch by one lookup:
 //! triangle → region → element. Two-sided faces have a patch for each side. Elements on which walls stand
-//! that light cannot pass are divided along them ([`separation`]), so that no patch lies in two rooms.
+//! that light cannot pass are divided along them (`separation`), so that no patch lies in two rooms.
 
 mod box_tree;
 mod clipped;
