@@ -14,21 +14,18 @@
 //! Every decision follows from sampled values, never from a clock, so that the result is the same at
 //! any thread count; a [`Control`] that measures time may end the work earlier.
 
+mod adapted;
 mod budget;
+mod gathering;
 
-use budget::even;
-
+pub use adapted::Adapted;
 pub use budget::{Budget, Mesh, ROW_RAYS, fewest_rays};
 
-use crate::gather::{
-    Components, ErrorParts, GatherConfig, Key, Lookup, MAX_REPLICATES, SkyRays, Solutions, Tally,
-    error_parts, gather,
-};
-use crate::patches::{Density, Patches};
-use crate::pilot::{self, PilotError};
-use crate::radiosity::{self, RadiosityConfig, RadiositySolution};
-use crate::solvers::{Config, SystemError, Tolerance};
+use crate::gather::{Components, ErrorParts, Tally};
+use crate::pilot::PilotError;
 use crate::world::{Receiver, World};
+use budget::even;
+use gathering::{Gathering, gathers};
 
 /// How far below the error asked for the budget is planned from a pilot, which knows its parts to a tenth
 /// or two, and how far below what 19 of 20 runs may not exceed from a gather at all receivers. Smaller, and
@@ -42,13 +39,6 @@ const FIRST_SHARE: f64 = 0.5;
 
 /// The largest growth of the gather rays in a round: where an error is out of reach no number suffices.
 const RAY_GROWTH: usize = 4;
-
-/// The largest growth of a mesh from one pilot to the next. The error of coarse meshes falls faster than
-/// any exponent says: a larger growth makes meshes twice as fine as they need to be.
-const MESH_GROWTH: usize = 4;
-
-/// Receivers of a pilot: their mean square error is then known to a tenth.
-const PILOT_RECEIVERS: usize = 128;
 
 /// A new mesh must be this much finer to be worth a new gather.
 const WORTHWHILE: f64 = 1.5;
@@ -66,25 +56,6 @@ const MAX_ROUNDS: usize = 24;
 /// 5000 have 0.1 %), and a larger growth casts a hundred times too many.
 const FIRST_SKY_RAYS: usize = 1024;
 const SKY_GROWTH: usize = 4;
-
-/// Independent gathers when there are receivers enough to tell the noise together, and the fewest such
-/// receivers. The more gathers share the rays, the less evenly each fills the hemisphere: with two
-/// instead of four the error of bare rooms is 15 % smaller, of a furnished office 7 %; with one it
-/// would not be known.
-const GATHERS: usize = 2;
-const MANY_RECEIVERS: usize = 64;
-
-/// Parts in which receivers are gathered, so that the control hears of them, and the fewest receivers
-/// of a part: fewer, and threads wait for each other.
-const PARTS: usize = 50;
-const SMALLEST_PART: usize = 64;
-
-/// Bound on the error that the iteration may leave, relative to the brightest patch: a hundredth of
-/// the smallest error that can be asked for would be 1e-7; sweeps are cheap beside rows.
-const TOLERANCE: f64 = 1e-7;
-
-/// Sweeps after which the iteration gives up: enough for reflectances up to 0.999.
-const MAX_ITERATIONS: usize = 20_000;
 
 /// Watches over the work and may end it.
 pub trait Control {
@@ -146,108 +117,6 @@ pub struct Adaptive {
     pub patches: usize,
     /// Why no more was done.
     pub ending: Ending,
-}
-
-/// A scene with the density of patches that follows its light.
-pub struct Adapted<'w, 's> {
-    world: &'w World<'s>,
-    density: Density,
-    seed: u64,
-}
-
-impl<'w, 's> Adapted<'w, 's> {
-    /// Finds out where the light is.
-    ///
-    /// # Errors
-    /// As [`pilot::density`].
-    pub fn new(world: &'w World<'s>, seed: u64) -> Result<Self, PilotError> {
-        let density = pilot::density(world, seed)?;
-        Ok(Self {
-            world,
-            density,
-            seed,
-        })
-    }
-
-    /// Solutions of about `patches` patches, and of a quarter of them. `Ok(None)` when `control`
-    /// stops.
-    ///
-    /// # Errors
-    /// When the scene cannot be meshed or the system not be solved.
-    pub fn solve(
-        &self,
-        patches: usize,
-        control: &mut dyn Control,
-    ) -> Result<Option<Lookup>, PilotError> {
-        let mesh = |count: usize| self.world.mesh_with_density(count.max(1), &self.density);
-        let (fine, coarse) = (mesh(patches)?, mesh(patches / 4)?);
-        if control.begin(Stage::Solving, budget::solve_cost(patches), MAX_REPLICATES) < 1.0 {
-            return Ok(None);
-        }
-        let mut on_fine = Vec::new();
-        let mut on_coarse = Vec::new();
-        for replicate in 0..MAX_REPLICATES as u64 {
-            on_fine.push(self.solve_once(&fine, replicate)?);
-            on_coarse.push(self.solve_once(&coarse, replicate)?);
-            if !control.advance() {
-                return Ok(None);
-            }
-        }
-        let lookup = Lookup::new(fine, &on_fine).with_coarse(coarse, &on_coarse);
-        Ok(Some(lookup))
-    }
-
-    fn solve_once(
-        &self,
-        patches: &Patches,
-        replicate: u64,
-    ) -> Result<RadiositySolution, SystemError> {
-        let config = RadiosityConfig {
-            rays: ROW_RAYS,
-            shadow_rays: 1,
-            solver: Config {
-                tolerance: Tolerance::Error(TOLERANCE),
-                max_iterations: MAX_ITERATIONS,
-            },
-            seed: self.seed,
-            replicate,
-        };
-        radiosity::solve(self.world, patches, &config)
-    }
-
-    /// Solutions that are good enough for a relative error at `count` receivers of which `sample`
-    /// are some, and the budget that a pilot gather at the sample suggests for all of them.
-    ///
-    /// # Errors
-    /// As [`Self::solve`].
-    pub fn prepare(
-        &self,
-        sample: &[Receiver],
-        count: usize,
-        config: &AdaptiveConfig,
-        control: &mut dyn Control,
-    ) -> Result<Option<(Lookup, Budget)>, PilotError> {
-        let error = config.error / SAFETY;
-        let mut pilot = first_budget(self.world, error, sample.len().min(PILOT_RECEIVERS));
-        let share = sample.len().div_ceil(PILOT_RECEIVERS).max(1);
-        let sample: Vec<Receiver> = sample.iter().copied().step_by(share).collect();
-        loop {
-            let Some(lookup) = self.solve(pilot.patches, control)? else {
-                return Ok(None);
-            };
-            let mut gathering = Gathering::new(self.world, &sample, gathers(count), config);
-            if !gathering.go_on(Some(&lookup), &pilot, Stage::Pilot, control) {
-                return Ok(None);
-            }
-            let parts = error_parts(&gathering.tallies);
-            let planned = plan(self.world, &pilot, error, &parts, count, Mesh::Free);
-            if planned.patches as f64 <= WORTHWHILE * pilot.patches as f64 {
-                let patches = pilot.patches;
-                return Ok(Some((lookup, Budget { patches, ..planned })));
-            }
-            pilot.patches = planned.patches.min(MESH_GROWTH * pilot.patches);
-        }
-    }
 }
 
 /// Irradiance at receivers, until `control` is satisfied.
@@ -400,113 +269,6 @@ fn plan(
         planned.shadow_rays = planned.shadow_rays.clamp(FIRST_SKY_RAYS, most);
     }
     planned
-}
-
-/// Independent gathers of so many receivers.
-fn gathers(receivers: usize) -> usize {
-    if receivers < MANY_RECEIVERS {
-        MAX_REPLICATES
-    } else {
-        GATHERS
-    }
-}
-
-/// Receivers with what has been gathered at them.
-struct Gathering<'a> {
-    world: &'a World<'a>,
-    receivers: &'a [Receiver],
-    gathers: usize,
-    config: AdaptiveConfig,
-    tallies: Vec<Tally>,
-    spent: Budget,
-}
-
-impl<'a> Gathering<'a> {
-    fn new(
-        world: &'a World<'a>,
-        receivers: &'a [Receiver],
-        gathers: usize,
-        config: &AdaptiveConfig,
-    ) -> Self {
-        Self {
-            world,
-            receivers,
-            gathers,
-            config: *config,
-            tallies: vec![Tally::default(); receivers.len()],
-            spent: Budget::default(),
-        }
-    }
-
-    /// What there is now.
-    fn state(&self, lookup: Option<&Lookup>) -> Adaptive {
-        Adaptive {
-            tallies: self.tallies.clone(),
-            parts: error_parts(&self.tallies),
-            solver_bound: lookup.map_or(0.0, Lookup::solver_bound),
-            budget: self.spent,
-            patches: lookup.map_or(0, |lookup| lookup.patches().len()),
-            ending: Ending::Stopped,
-        }
-    }
-
-    /// Gathers what is missing from what was spent to `budget`: gather rays are added, shadow rays
-    /// cast anew. False when `control` stops; the tallies are then as they were.
-    fn go_on(
-        &mut self,
-        lookup: Option<&Lookup>,
-        budget: &Budget,
-        stage: Stage,
-        control: &mut dyn Control,
-    ) -> bool {
-        let round = Budget {
-            patches: budget.patches,
-            rays: budget.rays - self.spent.rays,
-            shadow_rays: if budget.shadow_rays == self.spent.shadow_rays {
-                0
-            } else {
-                budget.shadow_rays
-            },
-        };
-        let cost = round.gather_cost(self.receivers.len());
-        let part = (self.receivers.len() / PARTS).max(SMALLEST_PART);
-        let parts = self.receivers.len().div_ceil(part);
-        let share = control.begin(stage, cost, parts);
-        if share <= 0.0 {
-            return false;
-        }
-        let round = round.scaled(share);
-        let config = GatherConfig {
-            rays: round.rays,
-            rays_before: self.spent.rays / self.gathers,
-            shadow_rays: round.shadow_rays,
-            sky: SkyRays::Apart,
-            gathers: self.gathers,
-            solutions: Solutions::All,
-            components: self.config.components,
-            seed: self.config.seed,
-        };
-        let mut tallies = Vec::with_capacity(self.receivers.len());
-        for receivers in self.receivers.chunks(part) {
-            let first = tallies.len() as u64;
-            let keys: Vec<Key> = (first..first + receivers.len() as u64)
-                .map(Key::of)
-                .collect();
-            tallies.extend(gather(self.world, lookup, receivers, &keys, &config));
-            if !control.advance() {
-                return false;
-            }
-        }
-        for (tally, more) in self.tallies.iter_mut().zip(&tallies) {
-            tally.join(more);
-        }
-        self.spent = Budget {
-            patches: budget.patches,
-            rays: self.spent.rays + round.rays,
-            shadow_rays: self.spent.shadow_rays.max(round.shadow_rays),
-        };
-        true
-    }
 }
 
 #[cfg(test)]

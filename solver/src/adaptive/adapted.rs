@@ -1,0 +1,129 @@
+//! A scene with what is looked up in it: solutions on meshes whose density follows the light.
+
+use super::budget;
+use super::gathering::{Gathering, gathers};
+use super::{
+    AdaptiveConfig, Budget, Control, Mesh, ROW_RAYS, SAFETY, Stage, WORTHWHILE, first_budget, plan,
+};
+use crate::gather::{Lookup, MAX_REPLICATES, error_parts};
+use crate::patches::{Density, Patches};
+use crate::pilot::{self, PilotError};
+use crate::radiosity::{self, RadiosityConfig, RadiositySolution};
+use crate::solvers::{Config, SystemError, Tolerance};
+use crate::world::{Receiver, World};
+
+/// The largest growth of a mesh from one pilot to the next. The error of coarse meshes falls faster than
+/// any exponent says: a larger growth makes meshes twice as fine as they need to be.
+const MESH_GROWTH: usize = 4;
+
+/// Receivers of a pilot: their mean square error is then known to a tenth.
+const PILOT_RECEIVERS: usize = 128;
+
+/// Bound on the error that the iteration may leave, relative to the brightest patch: a hundredth of
+/// the smallest error that can be asked for would be 1e-7; sweeps are cheap beside rows.
+const TOLERANCE: f64 = 1e-7;
+
+/// Sweeps after which the iteration gives up: enough for reflectances up to 0.999.
+const MAX_ITERATIONS: usize = 20_000;
+
+/// A scene with the density of patches that follows its light.
+pub struct Adapted<'w, 's> {
+    world: &'w World<'s>,
+    density: Density,
+    seed: u64,
+}
+
+impl<'w, 's> Adapted<'w, 's> {
+    /// Finds out where the light is.
+    ///
+    /// # Errors
+    /// As [`pilot::density`].
+    pub fn new(world: &'w World<'s>, seed: u64) -> Result<Self, PilotError> {
+        let density = pilot::density(world, seed)?;
+        Ok(Self {
+            world,
+            density,
+            seed,
+        })
+    }
+
+    /// Solutions of about `patches` patches, and of a quarter of them. `Ok(None)` when `control`
+    /// stops.
+    ///
+    /// # Errors
+    /// When the scene cannot be meshed or the system not be solved.
+    pub fn solve(
+        &self,
+        patches: usize,
+        control: &mut dyn Control,
+    ) -> Result<Option<Lookup>, PilotError> {
+        let mesh = |count: usize| self.world.mesh_with_density(count.max(1), &self.density);
+        let (fine, coarse) = (mesh(patches)?, mesh(patches / 4)?);
+        if control.begin(Stage::Solving, budget::solve_cost(patches), MAX_REPLICATES) < 1.0 {
+            return Ok(None);
+        }
+        let mut on_fine = Vec::new();
+        let mut on_coarse = Vec::new();
+        for replicate in 0..MAX_REPLICATES as u64 {
+            on_fine.push(self.solve_once(&fine, replicate)?);
+            on_coarse.push(self.solve_once(&coarse, replicate)?);
+            if !control.advance() {
+                return Ok(None);
+            }
+        }
+        let lookup = Lookup::new(fine, &on_fine).with_coarse(coarse, &on_coarse);
+        Ok(Some(lookup))
+    }
+
+    fn solve_once(
+        &self,
+        patches: &Patches,
+        replicate: u64,
+    ) -> Result<RadiositySolution, SystemError> {
+        let config = RadiosityConfig {
+            rays: ROW_RAYS,
+            shadow_rays: 1,
+            solver: Config {
+                tolerance: Tolerance::Error(TOLERANCE),
+                max_iterations: MAX_ITERATIONS,
+            },
+            seed: self.seed,
+            replicate,
+        };
+        radiosity::solve(self.world, patches, &config)
+    }
+
+    /// Solutions that are good enough for a relative error at `count` receivers of which `sample`
+    /// are some, and the budget that a pilot gather at the sample suggests for all of them.
+    ///
+    /// # Errors
+    /// As [`Self::solve`].
+    pub fn prepare(
+        &self,
+        sample: &[Receiver],
+        count: usize,
+        config: &AdaptiveConfig,
+        control: &mut dyn Control,
+    ) -> Result<Option<(Lookup, Budget)>, PilotError> {
+        let error = config.error / SAFETY;
+        let mut pilot = first_budget(self.world, error, sample.len().min(PILOT_RECEIVERS));
+        let share = sample.len().div_ceil(PILOT_RECEIVERS).max(1);
+        let sample: Vec<Receiver> = sample.iter().copied().step_by(share).collect();
+        loop {
+            let Some(lookup) = self.solve(pilot.patches, control)? else {
+                return Ok(None);
+            };
+            let mut gathering = Gathering::new(self.world, &sample, gathers(count), config);
+            if !gathering.go_on(Some(&lookup), &pilot, Stage::Pilot, control) {
+                return Ok(None);
+            }
+            let parts = error_parts(&gathering.tallies);
+            let planned = plan(self.world, &pilot, error, &parts, count, Mesh::Free);
+            if planned.patches as f64 <= WORTHWHILE * pilot.patches as f64 {
+                let patches = pilot.patches;
+                return Ok(Some((lookup, Budget { patches, ..planned })));
+            }
+            pilot.patches = planned.patches.min(MESH_GROWTH * pilot.patches);
+        }
+    }
+}
