@@ -1,11 +1,13 @@
 //! `luxel render`: a picture.
 
+mod prepare;
+
 use super::exit::{ExitCode, Failure};
 use super::goal::Goal;
 use super::refine::refine;
 use super::scene;
 use super::stated::StatedError;
-use super::steering::{Steering, first_error};
+use super::steering::Steering;
 use super::transport::{Transport, VIEW_PATCHES};
 use super::{Context, Session};
 use crate::camera::CameraFrame;
@@ -14,38 +16,24 @@ use crate::film::{Alike, Film, PixelError, SampleCounts};
 use crate::image::exr::{Origin, Picture};
 use crate::image::{Image, exr, png};
 use crate::integrators::ao::{self, AmbientOcclusion, Falloff};
-use crate::integrators::gather::{self, Gatherer};
+use crate::integrators::gather::Gatherer;
 use crate::integrators::path::PathTracer;
 use crate::integrators::radiosity::RadiosityView;
 use crate::integrators::whitted::{self, Highlight, Whitted};
-use crate::integrators::{Integrator, Samples, expose_further, unit_ray};
+use crate::integrators::{Integrator, Samples, expose_further};
 use crate::progress::Progress;
 use crate::tone_map::ToneMap;
 use crate::view::view;
 use clap::ValueEnum;
-use glam::DVec2;
 use luxel_scenes::{Irradiance, Rgb};
-use luxel_solver::adaptive::{Adapted, AdaptiveConfig};
 use luxel_solver::audit;
-use luxel_solver::bvh::{Hit, Ray};
-use luxel_solver::gather::{Components, Lookup};
-use luxel_solver::world::{Receiver, World};
+use luxel_solver::world::World;
+use prepare::{Prepared, prepare};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
-/// Rays for indirect light of a camera sample: with 16 samples 256 a pixel.
-const GATHER_RAYS: usize = 16;
-
-/// The same where an error is asked for: the rays of all samples of a pixel fill the hemisphere
-/// together, so that few a sample leave the edges more. The Cornell box to 2 %: 54 samples of 4 rays a
-/// pixel, or 25 of 16 in as much time.
-const REFINED_GATHER_RAYS: usize = 4;
-
 /// Shadow rays of a camera sample, unless a pilot says better.
 const SHADOW_RAYS: usize = 4;
-
-/// Patches of the solution for a fixed number of samples.
-const GATHER_PATCHES: usize = 6000;
 
 /// Refinement of a mesh whose error, or noise, is too large, and the most patches.
 const FINER: usize = 4;
@@ -410,80 +398,6 @@ fn needs_finer(
         && patches * FINER <= MOST_PATCHES
         && in_time
         && !context.interrupt.is_set()
-}
-
-/// What a gather looks up, and how.
-struct Prepared<'w, 's> {
-    scene: Adapted<'w, 's>,
-    lookup: Lookup,
-    patches: usize,
-    config: gather::Config,
-}
-
-/// Solutions that are good enough for the goal at what the camera sees, and how to gather from them.
-fn prepare<'w, 's>(
-    world: &'w World<'s>,
-    frame: &CameraFrame,
-    goal: Option<&Goal>,
-    context: &Context<'_>,
-) -> Result<Option<Prepared<'w, 's>>, Failure> {
-    let seed = context.common.seed;
-    let mut steering = Steering::new(context, goal);
-    let scene = Adapted::new(world, seed)?;
-    let mut config = gather::Config {
-        rays: GATHER_RAYS,
-        shadow_rays: SHADOW_RAYS,
-        seed,
-    };
-    let seen = first_hits(world, frame);
-    if goal.is_none() || seen.is_empty() {
-        let solved = scene.solve(GATHER_PATCHES, &mut steering)?;
-        return Ok(solved.map(|lookup| Prepared {
-            scene,
-            lookup,
-            patches: GATHER_PATCHES,
-            config,
-        }));
-    }
-    let wanted = AdaptiveConfig {
-        error: first_error(goal),
-        components: Components::All,
-        seed,
-    };
-    let [width, height] = frame.size();
-    let prepared = scene.prepare(&seen, width * height, &wanted, &mut steering)?;
-    Ok(prepared.map(|(lookup, budget)| {
-        let ratio = budget.shadow_rays as f64 / budget.rays as f64;
-        let shadow_rays = (ratio * REFINED_GATHER_RAYS as f64).round() as usize;
-        config.rays = REFINED_GATHER_RAYS;
-        config.shadow_rays = shadow_rays.clamp(1, REFINED_GATHER_RAYS);
-        Prepared {
-            scene,
-            lookup,
-            patches: budget.patches,
-            config,
-        }
-    }))
-}
-
-/// What the camera sees in a regular grid of pixels.
-fn first_hits(world: &World<'_>, frame: &CameraFrame) -> Vec<Receiver> {
-    /// Pixels along a side.
-    const GRID: usize = 24;
-    let [width, height] = frame.size();
-    let rays: Vec<Ray> = (0..GRID * GRID)
-        .map(|index| {
-            let along = |i: usize, side: usize| (i as f64 + 0.5) / GRID as f64 * side as f64;
-            let pixel = DVec2::new(along(index % GRID, width), along(index / GRID, height));
-            unit_ray(world, &frame.ray(pixel))
-        })
-        .collect();
-    let mut hits = vec![Hit::MISS; rays.len()];
-    world.bvh().closest_hits(&rays, &mut hits);
-    rays.iter()
-        .zip(&hits)
-        .filter_map(|(ray, hit)| Some(world.interaction(ray, hit)?.receiver))
-        .collect()
 }
 
 /// `WxH` in pixels.
