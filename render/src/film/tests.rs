@@ -93,7 +93,7 @@ fn noise_is_stated_as_it_is() {
         .sum();
     // Of 4096 values of z², whose standard deviation is about √2, the mean is known to 0.022. Four
     // samples cannot tell noise from edges: the range of nine values is 3σ of them, and what they
-    // may have missed 0.1 · 3²/4² = 0.06 of their variance.
+    // may have missed 0.07 · 3²/4² = 0.04 of their variance.
     let mean = z_squares / 4096.0;
     assert!((0.85..1.05).contains(&mean), "{mean}");
     assert!(errors.iter().all(|error| error.discretisation == Rgb::ZERO));

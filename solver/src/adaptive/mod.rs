@@ -7,8 +7,8 @@
 //! 3. When more patches are due, the scene is meshed and solved anew, with at most four times as many, and
 //!    the pilot repeated.
 //! 4. All receivers are gathered with half of the rays; the parts of the error are measured again, on all of
-//!    them, and the missing rays follow from that until 19 of 20 such runs are within the error
-//!    ([`ErrorParts::upper`]). Gather rays are kept: their sequences go on. Only where rays cannot make up for
+//!    them, and the missing rays follow from that until what most such runs do not exceed
+//!    ([`ErrorParts::upper`]) is within the error. Gather rays are kept: their sequences go on. Only where rays cannot make up for
 //!    the mesh a new one is made, and begins a new gather.
 //!
 //! Every decision follows from sampled values, never from a clock, so that the result is the same at
@@ -28,7 +28,7 @@ use budget::even;
 use gathering::{Gathering, gathers};
 
 /// How far below the error asked for the budget is planned from a pilot, which knows its parts to a tenth
-/// or two, and how far below what 19 of 20 runs may not exceed from a gather at all receivers. Smaller, and
+/// or two, and how far the upper estimate is planned below it from a gather at all receivers. Smaller, and
 /// many runs need one more round; larger, and all pay for it.
 const SAFETY: f64 = 1.25;
 const MARGIN: f64 = 1.03;

@@ -10,8 +10,8 @@
 //! **Tests.** `slabs`: a ray against boxes; `triangle`: a ray against triangles, watertight.
 //!
 //! **Traversal.** `traverse` is portable and takes one ray at a time. `kernel`, with AVX2 where the
-//! processor has it, keeps sixteen rays in flight. Both give the same bits: they do the same operations, none of them fused, and the answer does not
-//! depend on the order of visits (see `traverse`).
+//! processor has it, keeps sixteen rays in flight. Both give the same bits: they do the same operations,
+//! none of them fused, and the answer does not depend on the order of visits (see `traverse`).
 //!
 //! Packets of eight coherent rays (one box against eight rays) were built and measured on camera
 //! rays: 0.95 to 1.15 times the wave, not worth a second kernel.

@@ -17,12 +17,14 @@
 //! classes of a patch are luxel's own. Cost: M rays and S shadow rays a receiver; half the rays of a
 //! furnished room continue once.
 
+mod error_parts;
 mod lookup;
 mod near_chain;
 mod tally;
 
+pub use error_parts::{ErrorParts, error_parts};
 pub use lookup::{Lookup, MAX_REPLICATES, Solutions};
-pub use tally::{ErrorParts, Gathered, Tally, error_parts, finish};
+pub use tally::{Gathered, Tally, finish};
 
 use crate::direct::{DirectSampler, Dome, DomeRays, Sample, ShadowRays};
 use crate::sampling::{Sequence, Stage, hash};

@@ -8,8 +8,8 @@
 //!
 //!   E(y) = E' + (0, or with probability q: (E^direct(y) + B(next) − E') / q).
 //!
-//! The mean is that of the chain whatever E' is, and where patches are small enough there is no noise
-//! left. After [`MAX_LINKS`] links the class of the distance answers.
+//! The mean is that of the chain whatever E' is; where the solution shows what the chain finds, as in a
+//! furnace, the choice makes no noise. After [`MAX_LINKS`] links the class of the distance answers.
 //!
 //! Source: L. Szécsi, L. Szirmay-Kalos, C. Kelemen, "Variance Reduction for Russian-roulette",
 //! Journal of WSCG 11(3), 2003.
@@ -107,7 +107,7 @@ impl Found {
         self.add_square(path, mean);
     }
 
-    /// Takes in how much less a coarser mesh shows at a hit.
+    /// Takes in how much less a coarser mesh shows at a hit; `throughput` holds the weight of the comparison.
     fn compare(&mut self, throughput: Rgb, fine: &[Vec3], coarse: &[Vec3], range: Range<usize>) {
         for s in range {
             self.difference[s] += throughput * (fine[s] - coarse[s]).as_dvec3();

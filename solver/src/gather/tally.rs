@@ -133,7 +133,7 @@ impl Tally {
     }
 
     /// The means, without errors.
-    fn means(&self) -> Gathered {
+    pub(super) fn means(&self) -> Gathered {
         let gathers = usize::from(self.gathers).max(1);
         let rays = f64::from(self.rays.max(1));
         let mean =
@@ -163,118 +163,22 @@ pub fn finish(tallies: &[Tally]) -> Vec<Gathered> {
     gathered
 }
 
-/// Parts of a relative error, each the root mean square over all receivers and channels over their
-/// mean light.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct ErrorParts {
-    /// Noise of shadow rays.
-    pub direct: f64,
-    /// Noise of gather rays.
-    pub gather: f64,
-    /// Noise of the solutions.
-    pub solution: f64,
-    /// Size of the patches.
-    pub mesh: f64,
-    /// How far the square of the error that is made may be from that which is stated, one standard
-    /// deviation. Noise of gathers and shadow rays that few receivers have to themselves is larger or
-    /// smaller by chance; that of solutions is, for all receivers together. Both are known from few
-    /// replicates.
-    pub spread: f64,
-}
-
-/// Standard deviations between what is stated and what is not exceeded in 19 of 20 runs.
-const NINETEEN_OF_TWENTY: f64 = 1.645;
-
-impl ErrorParts {
-    /// All that is noise.
-    pub fn sampling(&self) -> f64 {
-        self.direct.hypot(self.gather).hypot(self.solution)
-    }
-
-    /// All parts together.
-    pub fn total(&self) -> f64 {
-        self.sampling().hypot(self.mesh)
-    }
-
-    /// What 19 of 20 runs do not exceed.
-    pub fn upper(&self) -> f64 {
-        (self.total().powi(2) + NINETEEN_OF_TWENTY * self.spread).sqrt()
-    }
-}
-
-/// Relative errors of all receivers together. The scatters are averaged as they are: their mean is
-/// unbiased, that of moderated ones, each on the safe side, would not be.
-pub fn error_parts(tallies: &[Tally]) -> ErrorParts {
-    let gathered: Vec<Gathered> = tallies.iter().map(Tally::means).collect();
-    let mut level = 0.0;
-    let mut squares = [0.0; 4];
-    // By receiver: its channels share their rays.
-    let mut own = vec![0.0; tallies.len()];
-    for channel in 0..3 {
-        let raw = Scatters::new(tallies, &gathered, channel);
-        for (own, noise) in own.iter_mut().zip(raw.direct.iter().zip(&raw.gather)) {
-            *own += noise.0 + noise.1;
-        }
-        let parts = [
-            &raw.direct,
-            &raw.gather,
-            &raw.solution,
-            &discretisation(&raw.differences, &raw.indirect_level),
-        ];
-        for (square, part) in squares.iter_mut().zip(parts) {
-            *square += part.iter().sum::<f64>();
-        }
-        level += gathered
-            .iter()
-            .map(|g| g.irradiance().0[channel])
-            .sum::<f64>();
-    }
-    let count = 3.0 * tallies.len() as f64;
-    let spread = if level > 0.0 {
-        let degrees = |replicates: u8| f64::from(replicates.max(2) - 1);
-        let gathers = degrees(tallies.first().map_or(0, |tally| tally.gathers));
-        let solutions = degrees(tallies.iter().map(|t| t.solutions).max().unwrap_or(0));
-        // With v = Σ σ² over d degrees of freedom, E[v²] = σ⁴ (1 + 2/d): the square of an error varies by 2 σ⁴,
-        // that of its estimate by 2 σ⁴/d.
-        let own: f64 = own.iter().map(|v| v * v).sum::<f64>() / (1.0 + 2.0 / gathers);
-        let common = squares[2] * squares[2] / (1.0 + 2.0 / solutions);
-        let variance = 2.0 * own * (1.0 + 1.0 / gathers) + 2.0 * common * (1.0 + 1.0 / solutions);
-        variance.sqrt() * count / (level * level)
-    } else {
-        0.0
-    };
-    let [direct, gather, solution, mesh] = squares.map(|square| {
-        if square > 0.0 {
-            (square / count).sqrt() / (level / count)
-        } else {
-            0.0
-        }
-    });
-    ErrorParts {
-        direct,
-        gather,
-        solution,
-        mesh,
-        spread,
-    }
-}
-
 /// What the errors of all receivers in one channel are judged from: variances of means, with what
 /// they are expected to be in proportion to.
-struct Scatters {
+pub(super) struct Scatters {
     gathers: u8,
     solutions: u8,
-    direct: Vec<f64>,
+    pub(super) direct: Vec<f64>,
     direct_level: Vec<f64>,
-    gather: Vec<f64>,
+    pub(super) gather: Vec<f64>,
     of_rays: Vec<f64>,
-    solution: Vec<f64>,
-    indirect_level: Vec<f64>,
-    differences: Vec<(f64, f64)>,
+    pub(super) solution: Vec<f64>,
+    pub(super) indirect_level: Vec<f64>,
+    pub(super) differences: Vec<(f64, f64)>,
 }
 
 impl Scatters {
-    fn new(tallies: &[Tally], gathered: &[Gathered], channel: usize) -> Self {
+    pub(super) fn new(tallies: &[Tally], gathered: &[Gathered], channel: usize) -> Self {
         let gathers = tallies.first().map_or(0, |tally| tally.gathers);
         let solutions = tallies.iter().map(|t| t.solutions).max().unwrap_or(0);
         let by = |value: &dyn Fn(&Tally, &Gathered) -> f64| -> Vec<f64> {
