@@ -18,8 +18,8 @@
 //! | 12 | offset 1e6 | `geometry::neither_units_nor_origin_change_the_light` |
 //! | 13 | emitters 1e8 brighter than the rest | `solving::a_bright_lamp_does_not_drown_a_dim_one`, `crate::enclosures::solutions_are_linear_in_the_light_over_eight_decades` |
 //! | 14 | light through a pin-hole | `form_factors::a_pin_hole_passes_what_it_should` |
-//! | 15 | dark room beside a lit one | `geometry::{walls_that_cross_and_gaps_keep_a_room_dark, a_floor_shared_by_two_rooms_keeps_one_dark, patches_of_a_floor_shared_by_two_rooms_keep_one_dark}`, `crate::stress_rays::a_dark_room_beside_a_lit_one_stays_dark` |
-//! | 16 | thin walls | `geometry::the_sides_of_a_thin_wall_are_independent`, shared floors: those of row 15 |
+//! | 15 | dark room beside a lit one | `rooms::{walls_that_cross_and_gaps_keep_a_room_dark, a_floor_shared_by_two_rooms_keeps_one_dark, patches_of_a_floor_shared_by_two_rooms_keep_one_dark}`, `crate::stress_rays::a_dark_room_beside_a_lit_one_stays_dark` |
+//! | 16 | thin walls | `rooms::the_sides_of_a_thin_wall_are_independent`, shared floors: those of row 15 |
 //! | 17 | slivers | `form_factors::slivers_keep_their_accuracy_and_reciprocity`, `crate::form_factors` |
 //! | 18 | tiny far source | `form_factors::far_squares_keep_their_digits`, `crate::form_factors` |
 //! | 19 | polygon that crosses the horizon | `form_factors::a_polygon_sinks_through_the_horizon_without_a_step` |
@@ -32,4 +32,5 @@
 
 mod form_factors;
 mod geometry;
+mod rooms;
 mod solving;
