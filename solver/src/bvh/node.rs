@@ -1,5 +1,7 @@
 //! Nodes of eight children and leaf blocks of four triangles, as structures of arrays.
 
+use glam::Vec3;
+
 /// Children of a node.
 pub(super) const WIDTH: usize = 8;
 /// Triangles of one leaf block.
@@ -75,18 +77,36 @@ impl Node {
     };
 }
 
-/// Four triangles: `corners[corner][axis][lane]`. Lanes without a triangle hold NaN, which no test
-/// accepts.
+/// Four triangles: `corners[corner][axis][lane]`, `normals[axis][lane]`. Lanes without a triangle hold NaN,
+/// which no test accepts. Four cache lines, of which rays that meet no triangle touch three.
 #[derive(Clone, Debug)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(super) struct Block {
     pub(super) corners: [[[f32; BLOCK]; 3]; 3],
     pub(super) triangles: [u32; BLOCK],
+    /// Cross products of the edges from the first corner to the second and third, in f64.
+    pub(super) normals: [[f64; BLOCK]; 3],
 }
 
 impl Block {
     pub(super) const EMPTY: Self = Self {
         corners: [[[f32::NAN; BLOCK]; 3]; 3],
         triangles: [u32::MAX; BLOCK],
+        normals: [[f64::NAN; BLOCK]; 3],
     };
+
+    /// Puts a triangle into a lane.
+    pub(super) fn set(&mut self, lane: usize, triangle: u32, corners: [Vec3; 3]) {
+        for (planes, corner) in self.corners.iter_mut().zip(corners) {
+            for (plane, value) in planes.iter_mut().zip(corner.to_array()) {
+                plane[lane] = value;
+            }
+        }
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
+        let normal = (b - a).cross(c - a);
+        for (plane, value) in self.normals.iter_mut().zip(normal.to_array()) {
+            plane[lane] = value;
+        }
+        self.triangles[lane] = triangle;
+    }
 }

@@ -27,7 +27,6 @@
 
 use super::node::{BLOCK, Block};
 use super::ray::{Hit, Ray};
-use glam::DVec3;
 
 /// The part of the test that depends on the ray only.
 #[derive(Clone, Copy, Debug)]
@@ -37,8 +36,11 @@ pub(super) struct Shear {
     pub(super) axes: [usize; 3],
     /// The shear of x and of y.
     pub(super) scale: [f32; 2],
-    /// The direction in the order of `axes`.
-    pub(super) direction: [f32; 3],
+    /// What a depth along z is, times this, in lengths of the direction.
+    depth_scale: f32,
+    /// The ray in the scene's order of axes.
+    ray_origin: [f64; 3],
+    ray_direction: [f64; 3],
 }
 
 impl Shear {
@@ -62,7 +64,9 @@ impl Shear {
             origin: [origin[kx], origin[ky], origin[kz]],
             axes: [kx, ky, kz],
             scale: [direction[kx] / direction[kz], direction[ky] / direction[kz]],
-            direction: [direction[kx], direction[ky], direction[kz]],
+            depth_scale: 1.0 / direction[kz],
+            ray_origin: origin.map(f64::from),
+            ray_direction: direction.map(f64::from),
         }
     }
 }
@@ -180,16 +184,14 @@ fn resolve(
 /// for a ray in the plane.
 #[inline]
 fn plane_distance(block: &Block, shear: &Shear, lane: usize) -> Option<f32> {
-    let relative = |corner: usize| {
-        let component = |k: usize| {
-            f64::from(block.corners[corner][shear.axes[k]][lane]) - f64::from(shear.origin[k])
-        };
-        DVec3::new(component(0), component(1), component(2))
-    };
-    let [a, b, c] = [relative(0), relative(1), relative(2)];
-    let normal = (b - a).cross(c - a);
-    let direction = DVec3::from_array(shear.direction.map(f64::from));
-    let t = (normal.dot(a) / normal.dot(direction)) as f32;
+    let (mut height, mut slope) = (0.0, 0.0);
+    for axis in 0..3 {
+        let normal = block.normals[axis][lane];
+        let from_origin = f64::from(block.corners[0][axis][lane]) - shear.ray_origin[axis];
+        height += normal * from_origin;
+        slope += normal * shear.ray_direction[axis];
+    }
+    let t = (height / slope) as f32;
     t.is_finite().then_some(t)
 }
 
@@ -220,8 +222,8 @@ fn sharpened(block: &Block, shear: &Shear, lane: usize, edge: [f32; 3]) -> Optio
 /// The distance by the edge functions, times their sum.
 #[cold]
 fn edge_distance(block: &Block, shear: &Shear, lane: usize, edge: [f32; 3]) -> f32 {
-    let scale = 1.0 / shear.direction[2];
-    let depth =
-        |corner: usize| scale * (block.corners[corner][shear.axes[2]][lane] - shear.origin[2]);
+    let depth = |corner: usize| {
+        shear.depth_scale * (block.corners[corner][shear.axes[2]][lane] - shear.origin[2])
+    };
     edge[0] * depth(0) + edge[1] * depth(1) + edge[2] * depth(2)
 }

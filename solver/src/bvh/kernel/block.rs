@@ -168,49 +168,18 @@ fn points(
     Some(points)
 }
 
+/// As `triangle::plane_distance`.
 #[inline]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
 fn plane_distances(block: &Block, setup: &Setup) -> __m128 {
-    let [ox, oy, oz, _] = setup.sheared_origin;
-    let [dx, dy, dz, _] = setup.sheared_direction;
-    let [ax, bx, cx] = relative(corners(block, setup, 0), ox);
-    let [ay, by, cy] = relative(corners(block, setup, 1), oy);
-    let [az, bz, cz] = relative(corners(block, setup, 2), oz);
-    let [ex, ey, ez] = [
-        _mm256_sub_pd(bx, ax),
-        _mm256_sub_pd(by, ay),
-        _mm256_sub_pd(bz, az),
-    ];
-    let [fx, fy, fz] = [
-        _mm256_sub_pd(cx, ax),
-        _mm256_sub_pd(cy, ay),
-        _mm256_sub_pd(cz, az),
-    ];
-    let nx = _mm256_sub_pd(_mm256_mul_pd(ey, fz), _mm256_mul_pd(fy, ez));
-    let ny = _mm256_sub_pd(_mm256_mul_pd(ez, fx), _mm256_mul_pd(fz, ex));
-    let nz = _mm256_sub_pd(_mm256_mul_pd(ex, fy), _mm256_mul_pd(fx, ey));
-    let height = _mm256_add_pd(
-        _mm256_add_pd(_mm256_mul_pd(nx, ax), _mm256_mul_pd(ny, ay)),
-        _mm256_mul_pd(nz, az),
-    );
-    let slope = _mm256_add_pd(
-        _mm256_add_pd(
-            _mm256_mul_pd(nx, _mm256_set1_pd(dx)),
-            _mm256_mul_pd(ny, _mm256_set1_pd(dy)),
-        ),
-        _mm256_mul_pd(nz, _mm256_set1_pd(dz)),
-    );
+    let (mut height, mut slope) = (_mm256_setzero_pd(), _mm256_setzero_pd());
+    for axis in 0..3 {
+        let normal = memory::load_f64(&block.normals[axis]);
+        let corner = _mm256_cvtps_pd(memory::load(&block.corners[0][axis]));
+        let from_origin = _mm256_sub_pd(corner, _mm256_set1_pd(setup.exact_origin[axis]));
+        let direction = _mm256_set1_pd(setup.exact_direction[axis]);
+        height = _mm256_add_pd(height, _mm256_mul_pd(normal, from_origin));
+        slope = _mm256_add_pd(slope, _mm256_mul_pd(normal, direction));
+    }
     _mm256_cvtpd_ps(_mm256_div_pd(height, slope))
-}
-
-/// The corners' coordinates relative to the ray's origin, in f64.
-#[inline]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn relative(corners: [__m128; 3], origin: f64) -> [__m256d; 3] {
-    let origin = _mm256_set1_pd(origin);
-    [
-        _mm256_sub_pd(_mm256_cvtps_pd(corners[0]), origin),
-        _mm256_sub_pd(_mm256_cvtps_pd(corners[1]), origin),
-        _mm256_sub_pd(_mm256_cvtps_pd(corners[2]), origin),
-    ]
 }

@@ -95,11 +95,27 @@ pub(super) fn children(node: &Node) -> __m256i {
 #[target_feature(enable = "avx2")]
 pub(super) unsafe fn coordinates(block: &Block, corner: usize, axis: usize) -> __m128 {
     debug_assert!(corner < 3 && axis < 3);
-    // SAFETY: the caller's promise; rows of 16 bytes in a block aligned by 32.
+    // SAFETY: the caller's promise; rows of 16 bytes in a block aligned by 64.
     unsafe {
         let first = block.corners.as_ptr().cast::<f32>();
         _mm_load_ps(first.add((3 * corner + axis) * BLOCK))
     }
+}
+
+/// Reads four lanes.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn load(lanes: &[f32; BLOCK]) -> __m128 {
+    // SAFETY: an unaligned load of four floats from an array of four.
+    unsafe { _mm_loadu_ps(lanes.as_ptr()) }
+}
+
+/// Reads four lanes of f64.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn load_f64(lanes: &[f64; BLOCK]) -> __m256d {
+    // SAFETY: an unaligned load of four numbers from an array of four.
+    unsafe { _mm256_loadu_pd(lanes.as_ptr()) }
 }
 
 /// Writes four lanes.

@@ -10,9 +10,9 @@ use std::arch::x86_64::*;
 #[derive(Clone, Copy)]
 #[repr(C, align(32))]
 pub(super) struct Setup {
-    /// Origin and direction in the sheared order of axes, in f64.
-    pub(super) sheared_origin: [f64; 4],
-    pub(super) sheared_direction: [f64; 4],
+    /// Origin and direction in f64.
+    pub(super) exact_origin: [f64; 4],
+    pub(super) exact_direction: [f64; 4],
     pub(super) origin: [f32; 4],
     pub(super) reciprocal: [f32; 4],
     /// Origin in the sheared order of axes.
@@ -74,8 +74,8 @@ impl Setup {
         let scale = _mm_div_ps(sheared_direction, along);
 
         let mut setup = Self {
-            sheared_origin: [0.0; 4],
-            sheared_direction: [0.0; 4],
+            exact_origin: [0.0; 4],
+            exact_direction: [0.0; 4],
             origin: [ox, oy, oz, 0.0],
             reciprocal: [0.0; 4],
             shear_origin: [0.0; 4],
@@ -84,11 +84,8 @@ impl Setup {
             axes: *axes,
             tmin: ray.tmin + 0.0,
         };
-        memory::store_f64(&mut setup.sheared_origin, _mm256_cvtps_pd(shear_origin));
-        memory::store_f64(
-            &mut setup.sheared_direction,
-            _mm256_cvtps_pd(sheared_direction),
-        );
+        memory::store_f64(&mut setup.exact_origin, _mm256_cvtps_pd(origin));
+        memory::store_f64(&mut setup.exact_direction, _mm256_cvtps_pd(direction));
         memory::store(&mut setup.reciprocal, reciprocal);
         memory::store(&mut setup.shear_origin, shear_origin);
         memory::store(&mut setup.scale, scale);
