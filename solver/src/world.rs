@@ -101,6 +101,7 @@ impl<'s> World<'s> {
     }
 
     /// What a ray met; `None` for a miss.
+    #[inline]
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<Interaction> {
         let triangle = hit.triangle()?;
         let geometry = self.surfaces.geometry();
@@ -133,12 +134,8 @@ impl<'s> World<'s> {
         let geometry = self.surfaces.geometry();
         let normal = geometry.normal(geometry.face(triangle));
         let side = Side::facing(ray.direction.as_dvec3(), normal);
-        let point = SurfacePoint {
-            triangle,
-            u: f64::from(hit.u),
-            v: f64::from(hit.v),
-        };
-        patches.seen_from(geometry, ray.origin.as_dvec3(), point, side)
+        let position = || geometry.interpolate(triangle, f64::from(hit.u), f64::from(hit.v));
+        patches.seen_from(ray.origin.as_dvec3(), triangle, position, side)
     }
 
     /// Receivers from world positions (metres) and normals. A position within rounding of a face

@@ -68,11 +68,11 @@ impl<'w> RadiosityView<'w> {
                 .to_radiance()
                 .0
         };
-        let fine = radiance(self.fine.at(self.world, vertex, replicate));
+        let fine = radiance(self.fine.at(vertex, replicate));
         let coarse = self
             .coarse
             .as_ref()
-            .map(|coarse| radiance(coarse.at(self.world, vertex, replicate)));
+            .map(|coarse| radiance(coarse.at(vertex, replicate)));
         Seen {
             value: fine,
             mesh_difference: fine - coarse.unwrap_or(fine),
@@ -104,15 +104,14 @@ impl<'w> Field<'w> {
     }
 
     /// Irradiance at a vertex in W/m².
-    fn at(&self, world: &World<'_>, vertex: &Vertex<'_>, replicate: u32) -> Rgb {
+    fn at(&self, vertex: &Vertex<'_>, replicate: u32) -> Rgb {
         let interaction = &vertex.interaction;
         let point = interaction.point;
-        let geometry = world.surfaces().geometry();
         let position = interaction.receiver.position;
         let before = position + vertex.view;
-        let Some(patch) = self
-            .patches
-            .seen_from(geometry, before, point, interaction.side)
+        let Some(patch) =
+            self.patches
+                .seen_from(before, point.triangle, || position, interaction.side)
         else {
             return Rgb::ZERO;
         };

@@ -7,10 +7,9 @@
 //! Single precision: 6·10⁻⁸ relative, far below what rays can resolve. Cost: 12 bytes a class and
 //! solution; the solutions of a class lie next to each other in memory.
 
-use crate::geometry::Geometry;
+use crate::geometry::TriangleId;
 use crate::patches::{PatchId, Patches, Side};
 use crate::radiosity::{Class, RadiositySolution, unknown};
-use crate::surface::SurfacePoint;
 use glam::{DVec3, Vec3};
 use luxel_scenes::Rgb;
 use std::ops::Range;
@@ -99,18 +98,20 @@ impl Lookup {
         self.fine.irradiance(patch, distance, self.solutions)
     }
 
-    /// The same at the same point on the coarse mesh, with the size of its patch in units; `None` without
+    /// The same at a position (unit frame) of a triangle, seen from `origin`, on the coarse mesh, with the size of its patch in units; `None` without
     /// one.
     pub(super) fn coarse_irradiance(
         &self,
-        geometry: &Geometry,
         origin: DVec3,
-        point: SurfacePoint,
+        triangle: TriangleId,
+        position: DVec3,
         side: Side,
         distance: f32,
     ) -> Option<(&[Vec3], f32)> {
         let coarse = self.coarse.as_ref()?;
-        let patch = coarse.patches.seen_from(geometry, origin, point, side)?;
+        let patch = coarse
+            .patches
+            .seen_from(origin, triangle, || position, side)?;
         let irradiance = coarse.irradiance(patch, distance, self.solutions);
         Some((irradiance, coarse.patches.size(patch)))
     }

@@ -96,6 +96,7 @@ impl Found {
     }
 
     /// Takes in what was looked up at a hit.
+    #[inline]
     fn look_up(&mut self, path: &mut Path, throughput: Rgb, shown: &[Vec3], range: Range<usize>) {
         let share = 1.0 / range.len() as f64;
         let mut mean = Rgb::ZERO;
@@ -247,10 +248,10 @@ impl<'a> Chains<'a> {
             if throughput == Rgb::ZERO {
                 continue;
             }
-            let geometry = surfaces.geometry();
             let patches = lookup.patches();
             let origin = ray.origin.as_dvec3();
-            let Some(patch) = patches.seen_from(geometry, origin, point, side) else {
+            let (triangle, position) = (point.triangle, interaction.receiver.position);
+            let Some(patch) = patches.seen_from(origin, triangle, || position, side) else {
                 continue;
             };
             let shown = lookup.irradiance(patch, hit.t);
@@ -258,7 +259,7 @@ impl<'a> Chains<'a> {
             if hit.t >= REACH * patches.size(patch) || link == MAX_LINKS {
                 found.look_up(&mut path, throughput, shown, range.clone());
                 if let Some((coarse, size)) =
-                    lookup.coarse_irradiance(geometry, origin, point, side, hit.t)
+                    lookup.coarse_irradiance(origin, triangle, position, side, hit.t)
                 {
                     let is_near = hit.t < REACH * size;
                     let weight = if is_near { NEAR_WEIGHT } else { 1.0 };

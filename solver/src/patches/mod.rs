@@ -28,7 +28,6 @@ pub use mesh::{MAX_PATCHES, MeshError, PatchSize};
 pub use region::SurfaceSample;
 
 use crate::geometry::{Geometry, TriangleId};
-use crate::surface::SurfacePoint;
 use glam::DVec3;
 use luxel_scenes::{Exitance, FaceId, Reflectance};
 use region::Region;
@@ -124,28 +123,32 @@ impl Patches {
         v: f64,
         side: Side,
     ) -> Option<PatchId> {
-        self.find(geometry, triangle, [u, v], side, None)
+        self.find(
+            triangle,
+            || geometry.interpolate(triangle, u, v),
+            side,
+            None,
+        )
     }
 
-    /// The patch that a ray sees at a point of a triangle, as [`Patches::at`]; within rounding of the
+    /// The patch that a ray sees at a `position` of a triangle, as [`Patches::at`]; within rounding of the
     /// foot of a wall that on the side that the ray comes from. `before` is its origin, or any other point of
-    /// its line before the hit, in the unit frame.
+    /// its line before the hit; both in the unit frame.
     pub fn seen_from(
         &self,
-        geometry: &Geometry,
         before: DVec3,
-        point: SurfacePoint,
+        triangle: TriangleId,
+        position: impl FnOnce() -> DVec3,
         side: Side,
     ) -> Option<PatchId> {
-        let weights = [point.u, point.v];
-        self.find(geometry, point.triangle, weights, side, Some(before))
+        self.find(triangle, position, side, Some(before))
     }
 
+    /// Patches of clusters of faces need no position.
     fn find(
         &self,
-        geometry: &Geometry,
         triangle: TriangleId,
-        [u, v]: [f64; 2],
+        position: impl FnOnce() -> DVec3,
         side: Side,
         seen_from: Option<DVec3>,
     ) -> Option<PatchId> {
@@ -154,8 +157,7 @@ impl Patches {
             Side::Front => region.first,
             Side::Back => region.first_back?,
         };
-        let element = region.element_at(|| geometry.interpolate(triangle, u, v), seen_from);
-        Some(PatchId(first + element))
+        Some(PatchId(first + region.element_at(position, seen_from)))
     }
 
     /// A point of a patch, uniform by area for uniform `sample` in [0, 1)².

@@ -10,7 +10,61 @@ pub(super) struct QuadGrid {
     corners: [DVec3; 4],
     /// Cells of the grid along s and t.
     counts: [u32; 2],
+    inverse: Inverse,
     forest: Forest,
+}
+
+/// What finds (s, t) of a point of the quad's plane from h, the vector from P(0,0) to it.
+#[derive(Clone, Debug)]
+enum Inverse {
+    /// Of a parallelogram: s and t are products of h with these.
+    Linear([DVec3; 2]),
+    /// Lines of constant s are straight, so that s solves the quadratic (s e − h) × (f + s g) = 0 with the edges
+    /// e and f at P(0,0) and the twist g; likewise t.
+    Quadratic {
+        /// Normal of the plane times e, f and g.
+        by_normal: [DVec3; 3],
+        /// e × g, −f × g and e × f, times the normal.
+        constants: [f64; 3],
+    },
+}
+
+impl Inverse {
+    fn new([a, b, c, d]: [DVec3; 4]) -> Self {
+        let (e, f, g) = (b - a, d - a, (a + c) - (b + d));
+        if g.length_squared() <= 1e-24 * (c - a).length_squared() {
+            let normal = e.cross(f);
+            let inverse = [f.cross(normal), normal.cross(e)];
+            return Self::Linear(inverse.map(|v| v / normal.length_squared()));
+        }
+        let normal = (c - a).cross(d - b);
+        Self::Quadratic {
+            by_normal: [e, f, g].map(|v| v.cross(normal)),
+            constants: [e.cross(g), g.cross(f), e.cross(f)].map(|v| v.dot(normal)),
+        }
+    }
+
+    /// (s, t), clamped to [0, 1]².
+    fn at(&self, h: DVec3) -> DVec2 {
+        let st = match self {
+            Self::Linear([u, v]) => DVec2::new(h.dot(*u), h.dot(*v)),
+            Self::Quadratic {
+                by_normal,
+                constants: [k2, l2, k1],
+            } => {
+                // Products h × e, h × f and h × g with the normal.
+                let [he, hf, hg] = by_normal.map(|v| h.dot(v));
+                // The root that stays finite as the twist vanishes; the linear terms are positive in a
+                // convex quad.
+                let root = |square: f64, linear: f64, constant: f64| {
+                    let discriminant = linear * linear - 4.0 * square * constant;
+                    -2.0 * constant / (linear + discriminant.max(0.0).sqrt())
+                };
+                DVec2::new(root(*k2, k1 - hg, -hf), root(*l2, k1 + hg, he))
+            }
+        };
+        st.clamp(DVec2::ZERO, DVec2::ONE)
+    }
 }
 
 impl QuadGrid {
@@ -26,6 +80,7 @@ impl QuadGrid {
         Self {
             corners,
             counts,
+            inverse: Inverse::new(corners),
             forest: Forest::uniform(counts[0] * counts[1]),
         }
     }
@@ -74,36 +129,14 @@ impl QuadGrid {
         a.lerp(b, s).lerp(d.lerp(c, s), t)
     }
 
-    /// What keeps the quad from being a parallelogram.
-    fn twist(&self) -> DVec3 {
-        let [a, b, c, d] = self.corners;
-        (a + c) - (b + d)
-    }
-
     pub(super) fn is_parallelogram(&self) -> bool {
-        let [a, _, c, _] = self.corners;
-        self.twist().length_squared() <= 1e-24 * (c - a).length_squared()
-    }
-
-    /// (s, t) of a point of the quad's plane, clamped to [0, 1]². Lines of constant s are
-    /// straight, so s solves the quadratic (a + s(b−a) − p) × ((d−a) + s·twist) = 0.
-    fn invert(&self, p: DVec3) -> DVec2 {
-        let [a, b, c, d] = self.corners;
-        let normal = (c - a).cross(d - b);
-        let cross = |u: DVec3, v: DVec3| u.cross(v).dot(normal);
-        let (e, f, g, h) = (b - a, d - a, self.twist(), p - a);
-        let (k2, k1, k0) = (cross(e, g), cross(e, f) - cross(h, g), -cross(h, f));
-        // The root that stays finite as the twist vanishes; k1 > 0 in a convex quad.
-        let discriminant = (k1 * k1 - 4.0 * k2 * k0).max(0.0).sqrt();
-        let s = -2.0 * k0 / (k1 + discriminant);
-        let (start, end) = (a.lerp(b, s), d.lerp(c, s));
-        let t = (p - start).dot(end - start) / (end - start).length_squared();
-        DVec2::new(s, t).clamp(DVec2::ZERO, DVec2::ONE)
+        matches!(self.inverse, Inverse::Linear(_))
     }
 
     pub(super) fn element_at(&self, p: DVec3) -> u32 {
         let [nu, nv] = self.counts;
-        let mut local = self.invert(p) * DVec2::new(f64::from(nu), f64::from(nv));
+        let counts = DVec2::new(f64::from(nu), f64::from(nv));
+        let mut local = self.inverse.at(p - self.corners[0]) * counts;
         let cell = [(local.x as u32).min(nu - 1), (local.y as u32).min(nv - 1)];
         local -= DVec2::new(f64::from(cell[0]), f64::from(cell[1]));
         self.forest.find(cell[1] * nu + cell[0], || {

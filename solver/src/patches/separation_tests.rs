@@ -4,7 +4,6 @@ use super::{PatchSize, Patches, Side};
 use crate::radiosity::{self, RadiosityConfig};
 use crate::sampling::{Stage, hash};
 use crate::solvers::{Config, Tolerance};
-use crate::surface::SurfacePoint;
 use crate::world::World;
 use glam::{DQuat, DVec3, EulerRot};
 use luxel_scenes::{FaceId, Material, Radiance, Reflectance, Scene, Sidedness};
@@ -374,9 +373,9 @@ fn the_foot_of_a_wall_belongs_to_the_side_that_looks() {
             let point = unit(DVec3::new(1.0 + off, random(1), 0.0));
             let located = world.surfaces().locate(&[floor], point);
             let seen = |from: DVec3| {
-                let point = SurfacePoint { ..located };
+                let position = || geometry.interpolate(located.triangle, located.u, located.v);
                 patches
-                    .seen_from(geometry, unit(from), point, Side::Front)
+                    .seen_from(unit(from), located.triangle, position, Side::Front)
                     .expect("a front")
             };
             for (x, is_lit) in [(random(2), true), (1.0 + random(2), false)] {

@@ -12,6 +12,9 @@ use glam::DVec3;
 pub(super) struct TriangleGrid {
     corners: [DVec3; 3],
     side: u32,
+    /// What the vector from the first corner to a point gives weights of the second and third corner with,
+    /// in units of a cell.
+    cells_along: [DVec3; 2],
     forest: Forest,
 }
 
@@ -43,9 +46,14 @@ impl TriangleGrid {
     /// A grid of cells of area about `size`².
     pub(super) fn new(corners: [DVec3; 3], area: f64, size: f64) -> Self {
         let side = (area.sqrt() / size).round().max(1.0) as u32;
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a);
+        let per_cell = f64::from(side) / normal.length_squared();
+        let cells_along = [(c - a).cross(normal), normal.cross(b - a)].map(|v| v * per_cell);
         Self {
             corners,
             side,
+            cells_along,
             forest: Forest::uniform(side * side),
         }
     }
@@ -93,11 +101,8 @@ impl TriangleGrid {
     }
 
     pub(super) fn element_at(&self, p: DVec3) -> u32 {
-        let [a, b, c] = self.corners;
-        let normal = (b - a).cross(c - a);
-        let scale = f64::from(self.side) / normal.length_squared();
-        let x = ((p - a).cross(c - a).dot(normal) * scale).max(0.0);
-        let y = ((b - a).cross(p - a).dot(normal) * scale).max(0.0);
+        let from_corner = p - self.corners[0];
+        let [x, y] = self.cells_along.map(|v| from_corner.dot(v).max(0.0));
         let (root, mut local) = self.root_at(x, y);
         self.forest.find(root, || local.step())
     }
