@@ -12,6 +12,7 @@
 //!
 //! From an element to a polygon, [`point_to_polygon`] is exact; it is the kernel of direct light, too.
 
+mod angle;
 mod area;
 mod assembly;
 mod between_objects;

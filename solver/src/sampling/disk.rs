@@ -17,15 +17,17 @@ pub fn sample(u: [f32; 2]) -> [f32; 2] {
     let a = 2.0 * u[0] - 1.0;
     let b = 2.0 * u[1] - 1.0;
     let flat = a.abs() > b.abs();
-    let (r, minor) = if flat { (a, b) } else { (b, a) };
+    let r = std::hint::select_unpredictable(flat, a, b);
+    let minor = std::hint::select_unpredictable(flat, b, a);
     // The centre of the square is the only place where r is zero.
     let ratio = if r == 0.0 { 0.0 } else { minor / r };
     let (sin, cos) = sin_cos_octant(ratio * FRAC_PI_4);
-    if flat {
-        [r * cos, r * sin]
-    } else {
-        [r * sin, r * cos]
-    }
+    let (along, across) = (r * cos, r * sin);
+    // Selected, not branched for: half of the branches would be mispredicted.
+    [
+        std::hint::select_unpredictable(flat, along, across),
+        std::hint::select_unpredictable(flat, across, along),
+    ]
 }
 
 /// Density per area of the unit disk: 1/π.

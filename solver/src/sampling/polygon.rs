@@ -27,6 +27,8 @@ pub struct Polygon {
 /// How the unit square is laid over the polygon.
 #[derive(Clone, Debug, PartialEq)]
 enum Map {
+    /// As it is: a parallelogram.
+    Affine,
     /// Bilinearly, with the Jacobian at (0, 0), (1, 0), (0, 1), (1, 1).
     Quadrilateral([f64; 4]),
     /// A fan around corner 0.
@@ -50,12 +52,17 @@ impl Polygon {
         let normal = vector_area / area;
         let map = if let &[a, b, c, d] = vertices {
             let jacobian = |s: DVec3, t: DVec3| s.cross(t).dot(normal).max(0.0);
-            Map::Quadrilateral([
-                jacobian(b - a, d - a),
-                jacobian(b - a, c - b),
-                jacobian(c - d, d - a),
-                jacobian(c - d, c - b),
-            ])
+            let twist = (a + c) - (b + d);
+            if twist.length_squared() <= 1e-24 * (c - a).length_squared() {
+                Map::Affine
+            } else {
+                Map::Quadrilateral([
+                    jacobian(b - a, d - a),
+                    jacobian(b - a, c - b),
+                    jacobian(c - d, d - a),
+                    jacobian(c - d, c - b),
+                ])
+            }
         } else {
             Map::Fan(Discrete::new(fan().map(|part| part.dot(normal).max(0.0))).ok()?)
         };
@@ -85,6 +92,10 @@ impl Polygon {
     /// The point (metres) for `u` in the unit square.
     pub fn sample(&self, u: [f64; 2]) -> DVec3 {
         match &self.map {
+            Map::Affine => {
+                let [a, b, _, d] = self.corners();
+                a + (b - a) * u[0] + (d - a) * u[1]
+            }
             Map::Quadrilateral(jacobian) => {
                 let [s, t] = bilinear::sample(u, *jacobian);
                 let [a, b, c, d] = self.corners();
@@ -106,6 +117,7 @@ impl Polygon {
     /// polygon.
     pub fn invert(&self, point: DVec3) -> [f64; 2] {
         match &self.map {
+            Map::Affine => self.invert_bilinear(point),
             Map::Quadrilateral(jacobian) => {
                 bilinear::invert(self.invert_bilinear(point), *jacobian)
             }
