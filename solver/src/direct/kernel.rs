@@ -9,7 +9,7 @@
 //! errors of 0.2–0.5 % that no number of points removes.
 //!
 //! Where a light gets many rays from one point, rejections would spoil their stratification: there
-//! [`Luminaire::warped`] draws points by a warp that is nearly the kernel and returns what is left as a weight,
+//! a [`Warp`] draws points that follow nearly the kernel and returns what is left as a weight,
 //! for a ratio estimate Σ w v / Σ w, whose bias is O(1/n) times the small scatter of the weights.
 //!
 //! Source: J. Arvo, "Stratified Sampling of Spherical Triangles", SIGGRAPH 1995; rejection after
@@ -32,6 +32,21 @@ const MAX_TRIES: u32 = 64;
 /// Radius over distance up to which drawing by area is the cheaper way: the bound is then at most
 /// five times the kernel.
 const AFAR: f64 = 0.3;
+
+/// A triangle of a polygon's fan as a receiver sees it.
+struct Slice<T> {
+    triangle: T,
+    corners: [DVec3; 3],
+    solid_angle: f64,
+}
+
+/// Memory for the part of a polygon above a horizon, and its fan.
+#[derive(Default)]
+pub(super) struct Scratch {
+    clipped: Vec<DVec3>,
+    uniform: Vec<Slice<SphericalTriangle>>,
+    warped: Vec<Slice<ProjectedSphericalTriangle>>,
+}
 
 /// An emissive polygon with what drawing from it needs.
 #[derive(Clone, Debug)]
@@ -64,15 +79,30 @@ impl Luminaire {
         &self.corners
     }
 
+    /// The mean of its corners.
+    pub(super) fn centre(&self) -> DVec3 {
+        self.centre
+    }
+
+    /// Distance from the centre to the farthest corner, in units.
+    pub(super) fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Area in square units.
+    pub(super) fn area(&self) -> f64 {
+        self.by_area.as_ref().map_or(0.0, Polygon::area)
+    }
+
     /// A point of the part above the horizon of a receiver at `position` with unit `normal`; `None`
-    /// when that part covers no solid angle. `scratch` holds it.
+    /// when that part covers no solid angle.
     pub(super) fn sample(
         &self,
         position: DVec3,
         normal: DVec3,
         sequence: Sequence,
         index: u32,
-        scratch: &mut Vec<DVec3>,
+        scratch: &mut Scratch,
     ) -> Option<DVec3> {
         let distance = position.distance(self.centre);
         let heights = || {
@@ -101,34 +131,48 @@ impl Luminaire {
                 position,
             );
         }
-        let plane = Plane {
-            point: position,
-            normal,
-        };
-        clip(&self.corners, &plane, scratch);
+        self.clip(position, normal, scratch);
         draw_by_solid_angle(position, normal, scratch, sequence, index)
     }
 
-    /// A point distributed nearly as the kernel, with its weight: kernel over density, up to a
-    /// constant; `None` when the part above the horizon covers no solid angle.
-    pub(super) fn warped(
-        &self,
+    /// What draws many points for a receiver at `position` with unit `normal`.
+    pub(super) fn warp<'a>(
+        &'a self,
         position: DVec3,
         normal: DVec3,
-        u: [f64; 2],
-        scratch: &mut Vec<DVec3>,
-    ) -> Option<(DVec3, f64)> {
-        if self.corners.len() > MAX_FAN {
-            let point = self.by_area.as_ref()?.sample(u);
-            let to = point - position;
-            return Some((point, normal.dot(to).max(0.0) / to.length().powi(4)));
+        scratch: &'a mut Scratch,
+    ) -> Warp<'a> {
+        let by_area = self.corners.len() > MAX_FAN;
+        scratch.warped.clear();
+        if !by_area {
+            self.clip(position, normal, scratch);
+            let triangles = fan(&scratch.clipped).filter_map(|corners| {
+                let triangle = ProjectedSphericalTriangle::new(position, normal, corners)?;
+                let solid_angle = triangle.triangle().solid_angle();
+                Some(Slice {
+                    triangle,
+                    corners,
+                    solid_angle,
+                })
+            });
+            scratch.warped.extend(triangles);
         }
+        Warp {
+            position,
+            normal,
+            by_area: self.by_area.as_ref().filter(|_| by_area),
+            solid_angle: total(&scratch.warped),
+            fan: &scratch.warped,
+        }
+    }
+
+    /// Leaves the part above the horizon in `scratch`.
+    fn clip(&self, position: DVec3, normal: DVec3, scratch: &mut Scratch) {
         let plane = Plane {
             point: position,
             normal,
         };
-        clip(&self.corners, &plane, scratch);
-        warp_by_solid_angle(position, normal, scratch, u)
+        clip(&self.corners, &plane, &mut scratch.clipped);
     }
 
     /// A distance that no point of the polygon is nearer than: that of its plane or of its bounding
@@ -154,80 +198,93 @@ fn draw_by_area(
     })
 }
 
+/// The triangles of a convex polygon; none of one that is clipped away.
+fn fan(polygon: &[DVec3]) -> impl Iterator<Item = [DVec3; 3]> + '_ {
+    let pairs = polygon.get(1..).unwrap_or_default().windows(2);
+    pairs.map(|pair| [polygon[0], pair[0], pair[1]])
+}
+
+fn total<T>(slices: &[Slice<T>]) -> f64 {
+    slices.iter().map(|slice| slice.solid_angle).sum()
+}
+
+/// The slice in which the solid angle up to `x` of all of it ends, and the share of it that is below.
+fn pick<T>(slices: &[Slice<T>], x: f64, solid_angle: f64) -> Option<(&Slice<T>, f64)> {
+    let mut rest = x * solid_angle;
+    let mut chosen = None;
+    for slice in slices {
+        let share = (rest / slice.solid_angle).clamp(0.0, 1.0 - f64::EPSILON);
+        chosen = Some((slice, share));
+        if rest < slice.solid_angle {
+            break;
+        }
+        rest -= slice.solid_angle;
+    }
+    chosen
+}
+
 /// Points of a polygon above the horizon, uniform by solid angle, kept by cos θ.
 fn draw_by_solid_angle(
     position: DVec3,
     normal: DVec3,
-    polygon: &[DVec3],
+    scratch: &mut Scratch,
     sequence: Sequence,
     index: u32,
 ) -> Option<DVec3> {
-    if polygon.len() < 3 {
+    let polygon = &scratch.clipped;
+    scratch.uniform.clear();
+    let triangles = fan(polygon).filter_map(|corners| {
+        let triangle = SphericalTriangle::new(position, corners)?;
+        let solid_angle = triangle.solid_angle();
+        Some(Slice {
+            triangle,
+            corners,
+            solid_angle,
+        })
+    });
+    scratch.uniform.extend(triangles);
+    if scratch.uniform.is_empty() {
         return None;
     }
-    // Clipping adds a corner.
-    let mut fan = [None; MAX_FAN];
-    let mut solid_angle = 0.0;
-    for (slot, pair) in fan.iter_mut().zip(polygon[1..].windows(2)) {
-        let corners = [polygon[0], pair[0], pair[1]];
-        *slot = SphericalTriangle::new(position, corners).map(|triangle| (triangle, corners));
-        solid_angle += slot.map_or(0.0, |(triangle, _)| triangle.solid_angle());
-    }
+    let solid_angle = total(&scratch.uniform);
     let highest = highest_cosine(position, normal, polygon);
     draw(sequence, index, |[x, y]| {
-        let mut rest = x * solid_angle;
-        let mut chosen = None;
-        for (triangle, corners) in fan.iter().flatten() {
-            chosen = Some((triangle, corners, rest / triangle.solid_angle()));
-            if rest < triangle.solid_angle() {
-                break;
-            }
-            rest -= triangle.solid_angle();
-        }
-        let (triangle, [a, b, c], share) = chosen?;
-        let drawn = triangle.sample([share.clamp(0.0, 1.0 - f64::EPSILON), y]);
-        let [wa, wb, wc] = drawn.barycentric;
-        Some((
-            *a * wa + *b * wb + *c * wc,
-            normal.dot(drawn.direction) / highest,
-        ))
+        let (slice, share) = pick(&scratch.uniform, x, solid_angle)?;
+        let drawn = slice.triangle.sample([share, y]);
+        let point = weighted(&slice.corners, drawn.barycentric);
+        Some((point, normal.dot(drawn.direction) / highest))
     })
 }
 
-/// A point of `polygon` (the part above the horizon) distributed nearly as the kernel, with its
-/// weight: kernel over density, up to a constant; `None` when it covers no solid angle.
-fn warp_by_solid_angle(
+fn weighted(corners: &[DVec3; 3], weights: [f64; 3]) -> DVec3 {
+    corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
+}
+
+/// Draws points that are distributed nearly as the kernel.
+pub(super) struct Warp<'a> {
     position: DVec3,
     normal: DVec3,
-    polygon: &[DVec3],
-    [x, y]: [f64; 2],
-) -> Option<(DVec3, f64)> {
-    if polygon.len() < 3 {
-        return None;
-    }
-    let mut fan = [None; MAX_FAN];
-    let mut solid_angle = 0.0;
-    for (slot, pair) in fan.iter_mut().zip(polygon[1..].windows(2)) {
-        let corners = [polygon[0], pair[0], pair[1]];
-        *slot = ProjectedSphericalTriangle::new(position, normal, corners)
-            .map(|triangle| (triangle, corners));
-        solid_angle += slot.map_or(0.0, |(triangle, _)| triangle.triangle().solid_angle());
-    }
-    let mut rest = x * solid_angle;
-    let mut chosen = None;
-    for (triangle, corners) in fan.iter().flatten() {
-        let own = triangle.triangle().solid_angle();
-        chosen = Some((triangle, corners, own, rest / own));
-        if rest < own {
-            break;
+    /// A polygon of too many corners for a fan.
+    by_area: Option<&'a Polygon>,
+    fan: &'a [Slice<ProjectedSphericalTriangle>],
+    solid_angle: f64,
+}
+
+impl Warp<'_> {
+    /// A point with its weight: kernel over density, up to a constant; `None` when the part above the horizon
+    /// covers no solid angle.
+    pub(super) fn sample(&self, [x, y]: [f64; 2]) -> Option<(DVec3, f64)> {
+        if let Some(polygon) = self.by_area {
+            let point = polygon.sample([x, y]);
+            let to = point - self.position;
+            return Some((point, self.normal.dot(to).max(0.0) / to.length().powi(4)));
         }
-        rest -= own;
+        let (slice, share) = pick(self.fan, x, self.solid_angle)?;
+        let drawn = slice.triangle.sample([share, y]);
+        let cosine = self.normal.dot(drawn.direction).max(0.0);
+        let weight = cosine / (drawn.pdf * slice.solid_angle);
+        Some((weighted(&slice.corners, drawn.barycentric), weight))
     }
-    let (triangle, [a, b, c], own, share) = chosen?;
-    let drawn = triangle.sample([share.clamp(0.0, 1.0 - f64::EPSILON), y]);
-    let [wa, wb, wc] = drawn.barycentric;
-    let weight = normal.dot(drawn.direction).max(0.0) / (drawn.pdf * own);
-    Some((*a * wa + *b * wb + *c * wc, weight))
 }
 
 /// Draws points with the probability of keeping each until one is kept.
@@ -277,99 +334,5 @@ fn highest_cosine(position: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::form_factors::point_to_polygon;
-    use crate::sampling::Stage;
-
-    /// The share of points in one half of a polygon is that half's share of the irradiance:
-    /// binomial, 5 σ.
-    fn check(position: DVec3, normal: DVec3, polygon: &[DVec3], cut: Plane) {
-        let mut visible = Vec::new();
-        clip(
-            polygon,
-            &Plane {
-                point: position,
-                normal,
-            },
-            &mut visible,
-        );
-        let mut half = Vec::new();
-        clip(&visible, &cut, &mut half);
-        let expected =
-            point_to_polygon(position, normal, &half) / point_to_polygon(position, normal, polygon);
-        let luminaire = Luminaire::new(polygon.to_vec());
-        let mut scratch = Vec::new();
-        let count = 40_000;
-        let sequence = Sequence::new(5, Stage::DIRECT, 0);
-        let inside = (0..count)
-            .filter_map(|i| luminaire.sample(position, normal, sequence, i, &mut scratch))
-            .filter(|point| cut.height(*point) > 0.0)
-            .count();
-        let share = inside as f64 / f64::from(count);
-        let sigma = (expected * (1.0 - expected) / f64::from(count)).sqrt();
-        assert!(
-            (share - expected).abs() < 5.0 * sigma,
-            "{share} against {expected}"
-        );
-    }
-
-    const QUAD: [DVec3; 4] = [
-        DVec3::new(-1.0, -0.5, 1.0),
-        DVec3::new(-1.0, 0.5, 1.0),
-        DVec3::new(1.0, 0.5, 1.0),
-        DVec3::new(1.0, -0.5, 1.0),
-    ];
-
-    #[test]
-    fn points_follow_the_kernel() {
-        let cut = Plane {
-            point: DVec3::new(0.3, 0.0, 0.0),
-            normal: DVec3::X,
-        };
-        let tilted = DVec3::new(0.9, 0.1, 0.3).normalize();
-        for (position, normal) in [
-            (DVec3::ZERO, DVec3::Z),
-            (DVec3::new(0.2, 0.1, 0.9), DVec3::Z),
-            (DVec3::new(-2.0, 0.0, 0.5), tilted),
-            (DVec3::new(0.0, 3.0, 0.0), DVec3::Z),
-            (DVec3::new(0.5, 0.2, -4.0), DVec3::Z),
-            (DVec3::new(-3.0, 1.0, -3.5), tilted),
-        ] {
-            check(position, normal, &QUAD, cut);
-        }
-    }
-
-    #[test]
-    fn a_disk_follows_the_kernel() {
-        let disk: Vec<DVec3> = (0..48)
-            .map(|k| {
-                let angle = -f64::from(k) * std::f64::consts::TAU / 48.0;
-                DVec3::new(angle.cos(), angle.sin(), 1.0)
-            })
-            .collect();
-        let cut = Plane {
-            point: DVec3::new(0.3, 0.0, 0.0),
-            normal: DVec3::X,
-        };
-        check(DVec3::ZERO, DVec3::Z, &disk, cut);
-        check(DVec3::new(1.5, 0.0, 0.0), DVec3::Z, &disk, cut);
-    }
-
-    #[test]
-    fn nothing_is_drawn_from_nothing() {
-        let sequence = Sequence::new(5, Stage::DIRECT, 0);
-        let drawn = |corners: &[DVec3]| {
-            let luminaire = Luminaire::new(corners.to_vec());
-            luminaire.sample(DVec3::ZERO, DVec3::Z, sequence, 0, &mut Vec::new())
-        };
-        let edge_on = [DVec3::X, DVec3::X * 2.0, DVec3::new(1.5, 1.0, 0.0)];
-        assert_eq!(drawn(&edge_on), None);
-        let below = [
-            DVec3::NEG_Z,
-            DVec3::NEG_Z + DVec3::X,
-            DVec3::NEG_Z + DVec3::Y,
-        ];
-        assert_eq!(drawn(&below), None);
-    }
-}
+#[path = "kernel_tests.rs"]
+mod tests;

@@ -6,6 +6,7 @@
 //! and gathers that leave the scene.
 
 mod dome;
+mod importance;
 mod kernel;
 mod lights;
 mod merge;

@@ -1,13 +1,15 @@
 //! Direct light at many points at once, with shadow rays in batches.
 //!
 //! E = Σ_lights E_i V_i, where E_i is the exact unoccluded irradiance and V_i the mean visibility
-//! of points of light i that are distributed as its kernel ([`super::kernel`]). Rays are shared out
-//! by contribution: a light that is due half a ray or more gets whole rays. The many small
+//! of points of light i that are distributed as its kernel ([`super::kernel`]). Few rays for many lights
+//! are given to lights by rough weights ([`super::importance`]), and only the E_i of these are computed. More rays
+//! are shared out by contribution: a light that is due half a ray or more gets whole rays. The many small
 //! contributions that are due less share a few rays by systematic sampling: each ray stands for
 //! Σ E / n of the light that it is cast to. Bounded by the unoccluded irradiance; exact where a light
 //! is wholly visible or wholly hidden; unbiased but for lights of [`MANY_RAYS`] rays and more, whose
 //! bias is far below their noise.
 
+use super::kernel::Scratch;
 use super::lights::{Lights, Source};
 use crate::bvh::{Bvh, Ray};
 use crate::geometry::ray_target;
@@ -18,6 +20,10 @@ use luxel_scenes::{Irradiance, Rgb};
 /// Rays to one light from which their mean is a ratio of stratified points and not a mean of
 /// rejected ones: the bias is then below a thousandth, and the noise a fifth lower.
 const MANY_RAYS: u32 = 8;
+
+/// Lights a ray from which their contributions are not all computed to choose among them: with fewer that costs
+/// little, and where nothing is hidden the sum of them all has no noise.
+const MANY_LIGHTS: usize = 8;
 
 /// How many shadow rays a point may cast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,11 +70,12 @@ pub struct DirectSampler<'a> {
     lights: &'a Lights,
     bvh: &'a Bvh,
     contributions: Vec<Contribution>,
+    importance: Vec<f32>,
     groups: Vec<Group>,
     rays: Vec<Ray>,
     weights: Vec<f64>,
     blocked: Vec<bool>,
-    clipped: Vec<DVec3>,
+    scratch: Scratch,
 }
 
 impl<'a> DirectSampler<'a> {
@@ -78,11 +85,12 @@ impl<'a> DirectSampler<'a> {
             lights,
             bvh,
             contributions: Vec::new(),
+            importance: Vec::new(),
             groups: Vec::new(),
             rays: Vec::new(),
             weights: Vec::new(),
             blocked: Vec::new(),
-            clipped: Vec::new(),
+            scratch: Scratch::default(),
         }
     }
 
@@ -105,7 +113,16 @@ impl<'a> DirectSampler<'a> {
         self.groups.clear();
         self.rays.clear();
         self.weights.clear();
+        let count = match shadow_rays {
+            ShadowRays::One => 1,
+            ShadowRays::About(count) => count,
+        };
+        let are_many = self.lights.sources().len() >= MANY_LIGHTS * count;
         for (index, sample) in samples.iter().enumerate() {
+            if are_many {
+                self.cast_by_importance(index, sample, count as u32);
+                continue;
+            }
             let total = self.contribute(sample);
             if total > 0.0 {
                 match shadow_rays {
@@ -172,8 +189,12 @@ impl<'a> DirectSampler<'a> {
                     Source::Point { .. } | Source::Directional { .. } => 1,
                 };
                 self.open_group(index, contribution.irradiance);
-                for ray in 0..rays {
-                    self.cast(sample, contribution.source, sample.index * rays + ray, rays);
+                if rays < MANY_RAYS {
+                    for ray in 0..rays {
+                        self.cast(sample, contribution.source, sample.index * rays + ray);
+                    }
+                } else {
+                    self.cast_many(sample, contribution.source, rays);
                 }
             } else {
                 rest.push(*contribution);
@@ -203,11 +224,36 @@ impl<'a> DirectSampler<'a> {
             while next < sum {
                 let share = step / contribution.weight;
                 self.open_group(index, contribution.irradiance * share);
-                self.cast(sample, contribution.source, sample.index, 1);
+                self.cast(sample, contribution.source, sample.index);
                 next += step;
             }
         }
         self.contributions = contributions;
+    }
+
+    /// Casts `count` rays by systematic sampling of rough weights of the lights.
+    fn cast_by_importance(&mut self, index: usize, sample: &Sample, count: u32) {
+        let mut importance = std::mem::take(&mut self.importance);
+        self.lights
+            .weigh(sample.position, sample.normal, &mut importance);
+        let total: f64 = importance.iter().map(|&weight| f64::from(weight)).sum();
+        let step = total / f64::from(count);
+        let [offset, _] = sample.sequence.dimension_set(u32::MAX).point2(sample.index);
+        let mut next = offset * step;
+        let mut sum = 0.0;
+        for (source, &weight) in importance.iter().enumerate() {
+            sum += f64::from(weight);
+            while next < sum {
+                let light = &self.lights.sources()[source];
+                let irradiance = light.irradiance(sample.position, sample.normal);
+                if irradiance != Rgb::ZERO {
+                    self.open_group(index, irradiance * (step / f64::from(weight)));
+                    self.cast(sample, source as u32, sample.index);
+                }
+                next += step;
+            }
+        }
+        self.importance = importance;
     }
 
     fn open_group(&mut self, index: usize, irradiance: Rgb) {
@@ -218,47 +264,60 @@ impl<'a> DirectSampler<'a> {
         });
     }
 
-    /// Casts one ray of the last group, which has `count` of them, to a source.
-    fn cast(&mut self, sample: &Sample, source: u32, index: u32, count: u32) {
-        let mut weight = 1.0;
-        let target = match &self.lights.sources()[source as usize] {
+    /// Casts one ray of the last group to a source.
+    fn cast(&mut self, sample: &Sample, source: u32, index: u32) {
+        let ray = match &self.lights.sources()[source as usize] {
             Source::Polygon {
                 shape,
                 normal,
                 extent,
                 ..
             } => {
-                let sequence = sample.sequence.dimension_set(source);
-                let point = if count < MANY_RAYS {
-                    shape.sample(
-                        sample.position,
-                        sample.normal,
-                        sequence,
-                        index,
-                        &mut self.clipped,
-                    )
-                } else {
-                    let u = sequence.point2(index);
-                    let (position, normal) = (sample.position, sample.normal);
-                    shape
-                        .warped(position, normal, u, &mut self.clipped)
-                        .map(|(point, kernel)| {
-                            weight = kernel;
-                            point
-                        })
-                };
+                let point = shape.sample(
+                    sample.position,
+                    sample.normal,
+                    sample.sequence.dimension_set(source),
+                    index,
+                    &mut self.scratch,
+                );
                 // Without solid angle in f64 there is no irradiance beyond rounding either.
                 let point = point.unwrap_or(shape.corners()[0]);
-                ray_target(point, *normal, *extent, sample.origin)
+                Ray::segment(
+                    sample.origin,
+                    ray_target(point, *normal, *extent, sample.origin),
+                )
             }
-            Source::Point { position, .. } => position.as_vec3(),
-            Source::Directional { towards, .. } => {
-                self.rays.push(Ray::new(sample.origin, towards.as_vec3()));
-                self.weights.push(weight);
-                return;
-            }
+            Source::Point { position, .. } => Ray::segment(sample.origin, position.as_vec3()),
+            Source::Directional { towards, .. } => Ray::new(sample.origin, towards.as_vec3()),
         };
-        self.rays.push(Ray::segment(sample.origin, target));
-        self.weights.push(weight);
+        self.rays.push(ray);
+        self.weights.push(1.0);
+    }
+
+    /// Casts the `count` rays of the last group to a polygon.
+    fn cast_many(&mut self, sample: &Sample, source: u32, count: u32) {
+        let Source::Polygon {
+            shape,
+            normal,
+            extent,
+            ..
+        } = &self.lights.sources()[source as usize]
+        else {
+            return self.cast(sample, source, sample.index);
+        };
+        let sequence = sample.sequence.dimension_set(source);
+        let warp = shape.warp(sample.position, sample.normal, &mut self.scratch);
+        for ray in 0..count {
+            let u = sequence.point2(sample.index * count + ray);
+            // As for one ray.
+            let (point, weight) = warp.sample(u).unwrap_or((shape.corners()[0], 1.0));
+            let target = ray_target(point, *normal, *extent, sample.origin);
+            self.rays.push(Ray::segment(sample.origin, target));
+            self.weights.push(weight);
+        }
     }
 }
+
+#[cfg(test)]
+#[path = "sampler_tests.rs"]
+mod tests;
