@@ -58,7 +58,8 @@ impl<'w, 's> Adapted<'w, 's> {
         control: &mut dyn Control,
     ) -> Result<Option<Lookup>, PilotError> {
         let mesh = |count: usize| self.world.mesh_with_density(count.max(1), &self.density);
-        let (fine, coarse) = (mesh(patches)?, mesh(patches / 4)?);
+        let (fine, coarse) = rayon::join(|| mesh(patches), || mesh(patches / 4));
+        let (fine, coarse) = (fine?, coarse?);
         if control.begin(Stage::Solving, budget::solve_cost(patches), MAX_REPLICATES) < 1.0 {
             return Ok(None);
         }

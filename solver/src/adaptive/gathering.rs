@@ -14,10 +14,10 @@ use crate::world::{Receiver, World};
 const GATHERS: usize = 2;
 const MANY_RECEIVERS: usize = 64;
 
-/// Parts in which receivers are gathered, so that the control hears of them, and the fewest receivers
-/// of a part: fewer, and threads wait for each other.
+/// Parts in which receivers are gathered, so that the control hears of them, and the fewest rays of a part:
+/// threads wait for each other at its end. A second of one thread holds some four times as many.
 const PARTS: usize = 50;
-const SMALLEST_PART: usize = 64;
+const RAYS_OF_PART: usize = 1 << 19;
 
 /// Independent gathers of so many receivers.
 pub(super) fn gathers(receivers: usize) -> usize {
@@ -86,7 +86,7 @@ impl<'a> Gathering<'a> {
             },
         };
         let cost = round.gather_cost(self.receivers.len());
-        let part = (self.receivers.len() / PARTS).max(SMALLEST_PART);
+        let part = (self.receivers.len() / PARTS).max(RAYS_OF_PART / round.rays.max(1));
         let parts = self.receivers.len().div_ceil(part);
         let share = control.begin(stage, cost, parts);
         if share <= 0.0 {

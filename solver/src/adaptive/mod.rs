@@ -7,9 +7,9 @@
 //! 3. When more patches are due, the scene is meshed and solved anew, with at most four times as many, and
 //!    the pilot repeated.
 //! 4. All receivers are gathered with half of the rays; the parts of the error are measured again, on all of
-//!    them, and the missing rays follow from that until what most such runs do not exceed
-//!    ([`ErrorParts::upper`]) is within the error. Gather rays are kept: their sequences go on. Only where rays cannot make up for
-//!    the mesh a new one is made, and begins a new gather.
+//!    them, and the missing rays follow from that until what 19 of 20 such runs do not exceed
+//!    ([`ErrorParts::upper`]) is within the error. Gather rays are kept: their sequences go on. Only where
+//!    rays cannot make up for the mesh a new one is made, and begins a new gather.
 //!
 //! Every decision follows from sampled values, never from a clock, so that the result is the same at
 //! any thread count; a [`Control`] that measures time may end the work earlier.
