@@ -3,7 +3,7 @@
 use glam::DVec3;
 use luxel_scenes::Rgb;
 use serde::Deserialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The file: columns of equal length.
 #[derive(Deserialize)]
@@ -18,6 +18,50 @@ struct Columns {
     direct: Vec<[f64; 3]>,
     #[serde(rename = "stderr", alias = "uncertainty")]
     standard_error: Vec<[f64; 3]>,
+    /// A second, independent estimate.
+    #[serde(rename = "E_path", default)]
+    path: Vec<[f64; 3]>,
+    #[serde(rename = "stderr_path", default)]
+    path_error: Vec<[f64; 3]>,
+}
+
+/// A further estimate at some of the points: `path.json`.
+#[derive(Deserialize)]
+struct Further {
+    index: Vec<usize>,
+    #[serde(rename = "E")]
+    irradiance: Vec<[f64; 3]>,
+    #[serde(rename = "stderr")]
+    standard_error: Vec<[f64; 3]>,
+}
+
+impl Columns {
+    /// Weighs a second estimate of a point with what there is: each by the inverse of its variance.
+    fn combine(&mut self, point: usize, irradiance: [f64; 3], standard_error: [f64; 3]) {
+        let (e, error) = (&mut self.irradiance[point], &mut self.standard_error[point]);
+        for channel in 0..3 {
+            let [own, other] = [error[channel], standard_error[channel]].map(|x| x * x);
+            if own + other > 0.0 {
+                e[channel] += (irradiance[channel] - e[channel]) * own / (own + other);
+                error[channel] = (own * other / (own + other)).sqrt();
+            }
+        }
+    }
+
+    /// Weighs all estimates that there are.
+    fn combine_all(&mut self, further: Option<Further>) {
+        let path = std::mem::take(&mut self.path);
+        let errors = std::mem::take(&mut self.path_error);
+        for (point, (irradiance, error)) in path.into_iter().zip(errors).enumerate() {
+            self.combine(point, irradiance, error);
+        }
+        if let Some(further) = further {
+            let values = further.irradiance.into_iter().zip(further.standard_error);
+            for (point, (irradiance, error)) in further.index.into_iter().zip(values) {
+                self.combine(point, irradiance, error);
+            }
+        }
+    }
 }
 
 /// Irradiance at the points of a scene, in W/m² on the front side.
@@ -45,11 +89,11 @@ impl IrradianceReference {
     /// # Panics
     /// When the file is missing or does not hold what it should.
     pub fn load(scene: &str) -> Self {
-        let path = folder().join(scene).join("irradiance.json");
-        let text = std::fs::read_to_string(&path)
-            .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        let columns: Columns = serde_json::from_str(&text)
-            .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let folder = folder().join(scene);
+        let path = folder.join("irradiance.json");
+        let mut columns: Columns = read(&path);
+        let further = folder.join("path.json");
+        columns.combine_all(further.exists().then(|| read(&further)));
         let n = columns.position.len();
         let lengths = [
             columns.normal.len(),
@@ -96,6 +140,12 @@ pub fn points_csv(points: impl IntoIterator<Item = (DVec3, DVec3)>) -> String {
         csv.push('\n');
     }
     csv
+}
+
+fn read<T: serde::de::DeserializeOwned>(path: &Path) -> T {
+    let text =
+        std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    serde_json::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
 /// Where the references lie.

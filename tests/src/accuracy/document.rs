@@ -95,8 +95,8 @@ fn scenes(seeds: u64, progress: &mut dyn FnMut(&str)) -> String {
 ## Scenes
 
 `luxel probe --error P%` at the 1000 points of each reference (`tests/references/`), {seeds} seeds. The furnace is held against its exact
-value, 2π; the other references are sampled, and the corridor's states a bound of 0.5 to 2 % a point instead of a standard error, which
-widens its share within. *stated* is the median of the errors that the runs stated; *met* is the share of the runs whose true nRMSE is
+value, 2π; the other references are sampled, and most of the corridor's points state a bound of 0.5 to 2 % instead of a standard error,
+which widens its share within. *stated* is the median of the errors that the runs stated; *met* is the share of the runs whose true nRMSE is
 what was asked for, *overspent* of those below a quarter of it. A run's seconds include reading the scene and meshing it.
 
 | scene | asked % | within % | mean z² | stated % | nRMSE %: median | max | relRMSE %: median | max | met % | overspent % | seconds |

@@ -3,7 +3,8 @@
 //! The true error is that of [`crate::metrics`]. The furnace is held against its exact value, 2π, since
 //! its path-traced reference is noisier than luxel there and states 0.77 of its own noise: only 90 %
 //! of its values are within two of their standard errors of 2π. What the corridor's reference states is
-//! not a standard error but a bound of 0.5 to 2 %, which widens the share within as errors fall below.
+//! at most points not a standard error but a bound of 0.5 to 2 %, which widens the share within as errors fall below; where it is
+//! least certain, path tracing outweighs it ([`crate::references`]).
 
 use super::{Calibration, Stated, largest, median};
 use crate::command::{arg, luxel};
