@@ -5,6 +5,7 @@
 //! say it briefly stands here.
 
 pub mod accuracy;
+pub mod benchmarks;
 pub mod builder;
 pub mod cases;
 pub mod chi_squared;

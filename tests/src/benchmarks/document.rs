@@ -1,0 +1,143 @@
+//! The tables as Markdown.
+
+use super::{probing, rendering, scaling, transport};
+use crate::picture::example;
+use luxel::report::machine::Machine;
+use std::fmt::Write as _;
+
+/// The document, every median of `runs` runs; `done` hears of finished parts.
+///
+/// # Panics
+/// When a command fails.
+pub fn document(runs: u64, done: &mut dyn FnMut(&str)) -> String {
+    let machine = Machine::this();
+    let mut text = format!(
+        "# Benchmarks
+
+Measured by `cargo run --release -p luxel-tests --bin benchmarks > BENCHMARKS.md` with luxel {} on {} ({} threads, {}). Medians of {runs}
+runs with seeds of their own; reading the scene, the ray tree and the estimate of the error are included. Errors are true ones against
+`tests/references/`, the noise of the reference subtracted unless said otherwise: nRMSE is the root mean square over the mean, relRMSE relative
+at every point.
+
+## `probe --error`, 1000 points
+
+| scene | asked for | seconds | nRMSE, median and largest % | relRMSE % | stated % | peak MB |
+|---|--:|--:|--:|--:|--:|--:|
+",
+        env!("CARGO_PKG_VERSION"),
+        machine.processor,
+        machine.threads,
+        machine.system,
+    );
+    for (scene, percent) in probing::TARGETS {
+        let probe = probing::probe(scene, percent, runs);
+        let mut errors: Vec<f64> = probe.runs.iter().map(|run| run.errors.nrmse).collect();
+        errors.sort_by(f64::total_cmp);
+        let last = probe.runs.last().expect("at least one run");
+        row(
+            &mut text,
+            format_args!(
+                "{scene} | {percent} % | {:.2} | {:.2} {:.2} | {:.1} | {:.2} | {}",
+                probe.seconds,
+                100.0 * errors[errors.len() / 2],
+                100.0 * errors[errors.len() - 1],
+                100.0 * last.errors.rel_rmse,
+                100.0 * last.stated,
+                megabytes(probe.peak),
+            ),
+        );
+        done(&format!("probe {scene} {percent}"));
+    }
+    text += "
+## `render --integrator gather --size 256x256 --error 2%`
+
+Errors against path-traced pictures whose own noise, 1.0 % (cornell) and 1.3 % (office) of relRMSE, is included.
+
+| scene | seconds | nRMSE % | relRMSE % | peak MB |
+|---|--:|--:|--:|--:|
+";
+    for scene in rendering::SCENES {
+        let picture = rendering::picture(scene, 2.0, runs.min(3));
+        let [nrmse, relative] = match picture.difference {
+            Some(d) => [d.nrmse, d.rel_rmse].map(|e| format!("{:.2}", 100.0 * e)),
+            None => ["–", "–"].map(str::to_owned),
+        };
+        row(
+            &mut text,
+            format_args!(
+                "{scene} | {:.1} | {nrmse} | {relative} | {}",
+                picture.seconds,
+                megabytes(picture.peak)
+            ),
+        );
+        done(&format!("render {scene}"));
+    }
+    text += &transports(done);
+    text += "
+## One thread against two
+
+| work in the office | seconds | ratio |
+|---|--:|--:|
+";
+    for (what, [one, two]) in scaling::office(runs.min(3)) {
+        row(
+            &mut text,
+            format_args!("{what} | {one:.2} {two:.2} | {:.2}", one / two),
+        );
+    }
+    done("scaling");
+    text
+}
+
+fn transports(done: &mut dyn FnMut(&str)) -> String {
+    let mut text = String::from(
+        "
+## Form factors
+
+All pairs of the patches of a closed cube with a box in it; the scene is in memory. The error is the stated one of a factor, root mean square over
+mean.
+
+| estimator | patches | seconds | largest defect of a row sum | error % |
+|---|--:|--:|--:|--:|
+",
+    );
+    for (name, factors) in transport::factors() {
+        row(
+            &mut text,
+            format_args!(
+                "{name} | {} | {:.2} | {:.1e} | {:.1}",
+                factors.patches,
+                factors.seconds,
+                factors.closure,
+                100.0 * factors.error
+            ),
+        );
+    }
+    done("form factors");
+    text += "
+Sparse rows of 512 rays each:
+
+| scene | patches | seconds | peak MB |
+|---|--:|--:|--:|
+";
+    for name in ["cornell", "office"] {
+        let loaded = luxel_scenes::load(example(name)).expect("an example scene");
+        let (patches, seconds, peak) = transport::rows(&loaded.scene);
+        row(
+            &mut text,
+            format_args!("{name} | {patches} | {seconds:.2} | {}", megabytes(peak)),
+        );
+    }
+    done("sparse rows");
+    text
+}
+
+fn megabytes(bytes: Option<u64>) -> String {
+    bytes.map_or("–".to_owned(), |bytes| {
+        format!("{:.0}", bytes as f64 / 1e6)
+    })
+}
+
+fn row(text: &mut String, cells: std::fmt::Arguments<'_>) {
+    writeln!(text, "| {cells} |").expect("a string takes all");
+}
