@@ -14,8 +14,8 @@ use crate::world::{Receiver, World};
 const GATHERS: usize = 2;
 const MANY_RECEIVERS: usize = 64;
 
-/// Parts in which receivers are gathered, so that the control hears of them, and the fewest rays of a part:
-/// threads wait for each other at its end. A second of one thread holds some four times as many.
+/// Parts in which receivers are gathered, so that the control hears of them, and the fewest rays of a part, shadow rays
+/// among them: threads wait for each other at its end. A second of one thread holds some four times as many.
 const PARTS: usize = 50;
 const RAYS_OF_PART: usize = 1 << 19;
 
@@ -86,7 +86,8 @@ impl<'a> Gathering<'a> {
             },
         };
         let cost = round.gather_cost(self.receivers.len());
-        let part = (self.receivers.len() / PARTS).max(RAYS_OF_PART / round.rays.max(1));
+        let part = (self.receivers.len() / PARTS)
+            .max(RAYS_OF_PART / (round.rays + round.shadow_rays).max(1));
         let parts = self.receivers.len().div_ceil(part);
         let share = control.begin(stage, cost, parts);
         if share <= 0.0 {

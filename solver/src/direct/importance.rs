@@ -9,7 +9,8 @@
 //! cosine at the polygon counts as that to its nearest point, and a polygon that the horizon cuts by what of its
 //! sphere is above. So w is zero only where the irradiance is, and E/w stays within a small factor: one source drawn
 //! in proportion to w gives E V Σw / w, unbiased, at the cost of a few nanoseconds a source and one exact
-//! E. Single precision, eight polygons at once. Point sources and parallel light count as what they are.
+//! E. What depends on the receiver is in single precision, eight polygons at once; radiosities are not, and may differ by
+//! any ratio. Point sources and parallel light count as what they are.
 //!
 //! Source: the disk is that of any textbook (J. R. Howell, catalogue B-12); one-sample estimates of many lights after P.
 //! Shirley, C. Wang, K. Zimmerman, "Monte Carlo techniques for direct lighting calculations", ACM TOG 15(1),
@@ -27,7 +28,7 @@ const ROUNDING: f32 = 1e-6;
 
 type Lanes = [f32; LANES];
 
-/// Eight polygons; lanes without one have no strength.
+/// Eight polygons.
 #[derive(Clone, Debug, Default)]
 struct Eight {
     centre: [Lanes; 3],
@@ -35,22 +36,21 @@ struct Eight {
     radius: Lanes,
     /// A/π.
     area: Lanes,
-    /// M A/π, the sum over channels.
-    strength: Lanes,
 }
 
 /// The sources of a scene.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Importance {
     polygons: Vec<Eight>,
-    count: usize,
+    /// M of each polygon in W/m², the sum over channels.
+    radiosity: Vec<f64>,
 }
 
 impl Importance {
     /// Of sources, the polygons among them first.
     pub(super) fn new(sources: &[Source]) -> Self {
         let mut polygons: Vec<Eight> = Vec::new();
-        let mut count = 0;
+        let mut radiosities = Vec::new();
         for source in sources {
             let Source::Polygon {
                 shape,
@@ -61,23 +61,25 @@ impl Importance {
             else {
                 break;
             };
-            let lane = count % LANES;
+            let index = radiosities.len();
+            let lane = index % LANES;
             if lane == 0 {
                 polygons.push(Eight::default());
             }
-            let eight = &mut polygons[count / LANES];
+            let eight = &mut polygons[index / LANES];
             let (centre, normal) = (shape.centre().as_vec3(), normal.as_vec3());
             for axis in 0..3 {
                 eight.centre[axis][lane] = centre[axis];
                 eight.normal[axis][lane] = normal[axis];
             }
-            let area = shape.area() as f32 / PI;
             eight.radius[lane] = shape.radius() as f32;
-            eight.area[lane] = area;
-            eight.strength[lane] = area * radiance.to_irradiance().0.element_sum() as f32;
-            count += 1;
+            eight.area[lane] = shape.area() as f32 / PI;
+            radiosities.push(radiance.to_irradiance().0.element_sum());
         }
-        Self { polygons, count }
+        Self {
+            polygons,
+            radiosity: radiosities,
+        }
     }
 
     /// Writes the weight of each source at a point of the unit frame with the given unit normal.
@@ -86,22 +88,24 @@ impl Importance {
         sources: &[Source],
         position: DVec3,
         normal: DVec3,
-        weights: &mut Vec<f32>,
+        weights: &mut Vec<f64>,
     ) {
         weights.clear();
         let (x, n) = (position.as_vec3(), normal.as_vec3());
-        for eight in &self.polygons {
-            weights.extend(eight.weights(x, n));
+        for (eight, radiosities) in self.polygons.iter().zip(self.radiosity.chunks(LANES)) {
+            let factors = eight.factors(x, n);
+            let products = radiosities.iter().zip(factors);
+            weights.extend(products.map(|(radiosity, factor)| radiosity * f64::from(factor)));
         }
-        weights.truncate(self.count);
-        let rest = sources[self.count..].iter();
-        weights.extend(rest.map(|source| source.irradiance(position, normal).element_sum() as f32));
+        let rest = sources[self.radiosity.len()..].iter();
+        weights.extend(rest.map(|source| source.irradiance(position, normal).element_sum()));
     }
 }
 
 impl Eight {
+    /// w/M.
     #[inline]
-    fn weights(&self, x: Vec3, n: Vec3) -> Lanes {
+    fn factors(&self, x: Vec3, n: Vec3) -> Lanes {
         std::array::from_fn(|lane| {
             let to = [
                 self.centre[0][lane] - x.x,
@@ -121,12 +125,11 @@ impl Eight {
             let partly = above * above / (4.0 * radius.max(f32::MIN_POSITIVE));
             let raised = if raised >= radius { raised } else { partly };
             let nearest = (height * height).max(squared - radius * radius);
-            let reach = squared + area;
+            let reach = (squared + area).max(ROUNDING * ROUNDING);
             let root = (reach * nearest.max(ROUNDING * ROUNDING)).sqrt();
-            let weight =
-                self.strength[lane] * (raised + ROUNDING) * (height + ROUNDING) / (reach * root);
+            let factor = area * (raised + ROUNDING) * (height + ROUNDING) / (reach * root);
             if height.min(above) > -ROUNDING {
-                weight
+                factor
             } else {
                 0.0
             }
@@ -171,7 +174,7 @@ mod tests {
             let normal = DVec3::new(random(3), random(4), random(5)).normalize();
             let mut weights = Vec::new();
             Importance::new(&sources).weigh(&sources, position, normal, &mut weights);
-            let weight = f64::from(weights[0]);
+            let weight = weights[0];
             let irradiance = sources[0].irradiance(position, normal).x;
             let Source::Polygon { shape, .. } = &sources[0] else {
                 unreachable!("a polygon")
@@ -187,12 +190,47 @@ mod tests {
                 afar = afar.max((ratio - 1.0).abs());
             }
         }
-        // From afar: (r/d)² and, for a light seen at a cosine above 0.1 by both, some r/d over it.
+        // From afar the cosine at the receiver varies by r/d over the light, a tenth of itself where it is above
+        // 0.1; that at the light by (r/d)².
         assert!(afar < 0.1, "afar the ratio differs from 1 by {afar}");
         // Bounded noise of one ray: no light outshines its weight by more.
         assert!(
             largest < 5.0,
             "the irradiance is {largest} times its weight"
         );
+    }
+    #[test]
+    fn a_weight_is_finite_and_in_proportion_to_the_radiosity() {
+        let Source::Polygon {
+            shape,
+            normal,
+            extent,
+            radiance,
+        } = polygon(1)
+        else {
+            unreachable!("a polygon")
+        };
+        let of = |factor: f64, position: DVec3| {
+            let sources = [Source::Polygon {
+                shape: shape.clone(),
+                normal,
+                extent,
+                radiance: Radiance(radiance.0 * factor),
+            }];
+            let mut weights = Vec::new();
+            Importance::new(&sources).weigh(&sources, position, normal, &mut weights);
+            weights[0]
+        };
+        // Beyond what single precision holds; one product of f64 each.
+        let below = shape.centre() + normal * 0.1;
+        let above = -normal;
+        let (one, dim) = (of(1.0, below), of(1e-100, below));
+        assert!(
+            (dim - one * 1e-100).abs() <= 1e-15 * dim.abs(),
+            "{one} {dim}"
+        );
+        for position in [shape.centre(), shape.corners()[0], above] {
+            assert!(of(1e100, position).is_finite(), "at {position}");
+        }
     }
 }

@@ -202,7 +202,7 @@ impl Lights {
 
     /// Writes roughly how much each of [`Self::sources`] lights a point of the unit frame with the given unit
     /// normal; zero only where a source does not.
-    pub(super) fn weigh(&self, position: DVec3, normal: DVec3, weights: &mut Vec<f32>) {
+    pub(super) fn weigh(&self, position: DVec3, normal: DVec3, weights: &mut Vec<f64>) {
         self.importance
             .weigh(&self.sources, position, normal, weights);
     }

@@ -5,9 +5,9 @@
 //! are given to lights by rough weights ([`super::importance`]), and only the E_i of these are computed. More rays
 //! are shared out by contribution: a light that is due half a ray or more gets whole rays. The many small
 //! contributions that are due less share a few rays by systematic sampling: each ray stands for
-//! Σ E / n of the light that it is cast to. Bounded by the unoccluded irradiance; exact where a light
-//! is wholly visible or wholly hidden; unbiased but for lights of [`MANY_RAYS`] rays and more, whose
-//! bias is far below their noise.
+//! Σ E / n of the light that it is cast to. Bounded by the unoccluded irradiance, and exact where a light
+//! is wholly visible or wholly hidden; by rough weights bounded by five times that, and exact on average only. Unbiased
+//! but for lights of [`MANY_RAYS`] rays and more, whose bias is far below their noise.
 
 use super::kernel::Scratch;
 use super::lights::{Lights, Source};
@@ -28,7 +28,7 @@ const MANY_LIGHTS: usize = 8;
 /// How many shadow rays a point may cast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShadowRays {
-    /// One ray, to a light chosen by its contribution.
+    /// One ray, to a light chosen by its contribution, roughly where there are many.
     One,
     /// About this many, shared out by contribution.
     About(usize),
@@ -70,7 +70,7 @@ pub struct DirectSampler<'a> {
     lights: &'a Lights,
     bvh: &'a Bvh,
     contributions: Vec<Contribution>,
-    importance: Vec<f32>,
+    importance: Vec<f64>,
     groups: Vec<Group>,
     rays: Vec<Ray>,
     weights: Vec<f64>,
@@ -212,47 +212,30 @@ impl<'a> DirectSampler<'a> {
     /// Casts `count` rays to the collected contributions by systematic sampling of their weights.
     fn cast_shared(&mut self, index: usize, sample: &Sample, total: f64, count: u32, set: u32) {
         let contributions = std::mem::take(&mut self.contributions);
+        let weights = contributions.iter().map(|contribution| contribution.weight);
         let step = total / f64::from(count);
-        let [offset, _] = sample
-            .sequence
-            .dimension_set(u32::MAX - set)
-            .point2(sample.index);
-        let mut next = offset * step;
-        let mut sum = 0.0;
-        for contribution in &contributions {
-            sum += contribution.weight;
-            while next < sum {
-                let share = step / contribution.weight;
-                self.open_group(index, contribution.irradiance * share);
-                self.cast(sample, contribution.source, sample.index);
-                next += step;
-            }
-        }
+        systematic(weights, step, offset(sample, set), |chosen, share| {
+            let contribution = &contributions[chosen];
+            self.open_group(index, contribution.irradiance * share);
+            self.cast(sample, contribution.source, sample.index);
+        });
         self.contributions = contributions;
     }
 
     /// Casts `count` rays by systematic sampling of rough weights of the lights.
     fn cast_by_importance(&mut self, index: usize, sample: &Sample, count: u32) {
+        let (lights, position, normal) = (self.lights, sample.position, sample.normal);
         let mut importance = std::mem::take(&mut self.importance);
-        self.lights
-            .weigh(sample.position, sample.normal, &mut importance);
-        let total: f64 = importance.iter().map(|&weight| f64::from(weight)).sum();
-        let step = total / f64::from(count);
-        let [offset, _] = sample.sequence.dimension_set(u32::MAX).point2(sample.index);
-        let mut next = offset * step;
-        let mut sum = 0.0;
-        for (source, &weight) in importance.iter().enumerate() {
-            sum += f64::from(weight);
-            while next < sum {
-                let light = &self.lights.sources()[source];
-                let irradiance = light.irradiance(sample.position, sample.normal);
-                if irradiance != Rgb::ZERO {
-                    self.open_group(index, irradiance * (step / f64::from(weight)));
-                    self.cast(sample, source as u32, sample.index);
-                }
-                next += step;
+        lights.weigh(position, normal, &mut importance);
+        let step = importance.iter().sum::<f64>() / f64::from(count);
+        let weights = importance.iter().copied();
+        systematic(weights, step, offset(sample, 0), |chosen, share| {
+            let irradiance = lights.sources()[chosen].irradiance(position, normal);
+            if irradiance != Rgb::ZERO {
+                self.open_group(index, irradiance * share);
+                self.cast(sample, chosen as u32, sample.index);
             }
-        }
+        });
         self.importance = importance;
     }
 
@@ -314,6 +297,31 @@ impl<'a> DirectSampler<'a> {
             let target = ray_target(point, *normal, *extent, sample.origin);
             self.rays.push(Ray::segment(sample.origin, target));
             self.weights.push(weight);
+        }
+    }
+}
+
+/// Where systematic sampling begins, as a share of its step.
+fn offset(sample: &Sample, set: u32) -> f64 {
+    let sequence = sample.sequence.dimension_set(u32::MAX - set);
+    let [offset, _] = sequence.point2(sample.index);
+    offset
+}
+
+/// Visits what lies at every `step` of the sum of weights, with step over weight: what a visit stands for.
+fn systematic(
+    weights: impl Iterator<Item = f64>,
+    step: f64,
+    offset: f64,
+    mut visit: impl FnMut(usize, f64),
+) {
+    let mut next = offset * step;
+    let mut sum = 0.0;
+    for (index, weight) in weights.enumerate() {
+        sum += weight;
+        while next < sum {
+            visit(index, step / weight);
+            next += step;
         }
     }
 }

@@ -71,7 +71,8 @@ fn one_ray_for_many_lights_is_right_on_average() {
             (one - many).abs() < 4.0 * sigma,
             "{one} with one ray, {many} with many, {sigma}"
         );
-        // No more noise than drawing a light by chance alone: about one light in two is hidden.
+        // One ray that finds all of the light or none, each half of the time, has the variance E²: visibility
+        // may make that much, and rough weights should not add to it.
         assert!(variance_of_one * 20_000.0 < one * one, "{variance_of_one}");
     }
 }
