@@ -23,13 +23,13 @@ pub use document::document;
 const ROUNDING: f64 = crate::irradiance_fields::ROUNDING;
 
 /// The middle of some numbers, the upper one of an even number of them; NaN without any.
-fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// The largest of some numbers, none of which is negative; zero without any.
-fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(crate) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, f64::max)
 }

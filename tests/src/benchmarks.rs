@@ -14,6 +14,7 @@ pub mod transport;
 
 pub use document::document;
 
+use crate::accuracy::median;
 use std::time::Instant;
 
 /// Median seconds of some runs, the largest peak of memory among them, and what the last one gave.
@@ -26,7 +27,6 @@ fn measured<T>(runs: u64, mut run: impl FnMut(u64) -> T) -> (f64, Option<u64>, T
         last = Some(run(k));
         seconds.push(start.elapsed().as_secs_f64());
     }
-    seconds.sort_by(f64::total_cmp);
     let last = last.expect("at least one run");
-    (seconds[seconds.len() / 2], memory::peak(), last)
+    (median(seconds), memory::peak(), last)
 }

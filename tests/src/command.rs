@@ -58,3 +58,17 @@ pub fn luxel(args: &[&str]) -> Outcome {
 pub fn arg(path: &Path) -> &str {
     path.to_str().expect("paths of tests are UTF-8")
 }
+
+/// The first argument of this program as a number of things, or `default` without one.
+///
+/// # Errors
+/// When it is no positive number.
+pub fn count_argument(things: &str, default: u64) -> Result<u64, String> {
+    match std::env::args().nth(1) {
+        None => Ok(default),
+        Some(text) => match text.parse() {
+            Ok(count) if count > 0 => Ok(count),
+            _ => Err(format!("{text:?} is no number of {things}: 1, 2, 3, …")),
+        },
+    }
+}

@@ -1,6 +1,7 @@
 //! The tables as Markdown.
 
 use super::{probing, rendering, scaling, transport};
+use crate::accuracy::{largest, median};
 use crate::picture::example;
 use luxel::report::machine::Machine;
 use std::fmt::Write as _;
@@ -31,16 +32,15 @@ at every point.
     );
     for (scene, percent) in probing::TARGETS {
         let probe = probing::probe(scene, percent, runs);
-        let mut errors: Vec<f64> = probe.runs.iter().map(|run| run.errors.nrmse).collect();
-        errors.sort_by(f64::total_cmp);
+        let errors = || probe.runs.iter().map(|run| 100.0 * run.errors.nrmse);
         let last = probe.runs.last().expect("at least one run");
         row(
             &mut text,
             format_args!(
                 "{scene} | {percent} % | {:.2} | {:.2} {:.2} | {:.1} | {:.2} | {}",
                 probe.seconds,
-                100.0 * errors[errors.len() / 2],
-                100.0 * errors[errors.len() - 1],
+                median(errors()),
+                largest(errors()),
                 100.0 * last.errors.rel_rmse,
                 100.0 * last.stated,
                 megabytes(probe.peak),

@@ -1,6 +1,7 @@
 //! `luxel probe --error` at the thousand points of the reference scenes.
 
 use super::measured;
+use crate::accuracy::median;
 use crate::accuracy::scenes::{Run, reference, run};
 
 /// What is asked for.
@@ -33,10 +34,8 @@ pub fn probe(scene: &str, percent: f64, runs: u64) -> Probe {
     let mut done = Vec::new();
     let (_, peak, ()) = measured(runs, |seed| done.push(run(&reference, percent, seed)));
     // The command's own clock: what scores a run against the reference is not its work.
-    let mut seconds: Vec<f64> = done.iter().map(|run| run.seconds).collect();
-    seconds.sort_by(f64::total_cmp);
     Probe {
-        seconds: seconds[seconds.len() / 2],
+        seconds: median(done.iter().map(|run| run.seconds)),
         peak,
         runs: done,
     }

@@ -1,6 +1,7 @@
 //! The same work with one thread and with two.
 
 use super::measured;
+use crate::accuracy::median;
 use crate::command::{arg, luxel};
 use crate::picture::example;
 use crate::references::IrradianceReference;
@@ -13,10 +14,7 @@ fn in_turns(runs: u64, run: impl Fn(&str)) -> [f64; 2] {
             list.push(measured(1, |_| run(threads)).0);
         }
     }
-    seconds.map(|mut list| {
-        list.sort_by(f64::total_cmp);
-        list[list.len() / 2]
-    })
+    seconds.map(median)
 }
 
 /// Rows, gather and image of the office: what is done and the seconds with one thread and with two.

@@ -1,9 +1,9 @@
 //! Form factors between all patches, and sparse rows of them.
 
 use super::measured;
+use crate::builder::{Part, room, scene, solid_box};
 use glam::DVec3;
-use luxel_scenes::generate::{Surface, furnace_box};
-use luxel_scenes::{Material, Reflectance, Scene};
+use luxel_scenes::Scene;
 use luxel_solver::form_factors::{
     AnalyticConfig, RayCastConfig, RayCastRowsConfig, analytic_factors, closure, ray_cast,
     ray_cast_rows,
@@ -13,33 +13,14 @@ use luxel_solver::transport::Dense;
 use luxel_solver::world::World;
 
 /// A closed cube of 1 m with a box in it that hides its sides from each other.
-fn room() -> Scene {
-    let mut scene = furnace_box(DVec3::ONE, Surface::grey(0.5, 1.0));
-    let object = scene.push_object("box");
-    let material = scene.push_material(Material::diffuse("grey", Reflectance::splat(0.5)));
-    let (low, high) = (DVec3::splat(0.35), DVec3::splat(0.65));
-    for axis in 0..3 {
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        for is_high in [false, true] {
-            let corner = |i: bool, j: bool| {
-                let mut p = if is_high { high } else { low };
-                p[u] = if i { high[u] } else { low[u] };
-                p[v] = if j { high[v] } else { low[v] };
-                p
-            };
-            let mut face = [
-                corner(false, false),
-                corner(true, false),
-                corner(true, true),
-                corner(false, true),
-            ];
-            if !is_high {
-                face.reverse();
-            }
-            scene.push_face(&face, object, material);
-        }
-    }
-    scene
+fn cube() -> Scene {
+    let walls = room(DVec3::ZERO, DVec3::ONE);
+    let block = solid_box(DVec3::splat(0.35), DVec3::splat(0.65));
+    let parts = [
+        Part::grey("walls", 0.5, walls),
+        Part::grey("block", 0.5, block),
+    ];
+    scene("a block in a cube", parts)
 }
 
 /// Form factors by one estimator.
@@ -60,7 +41,7 @@ pub struct Factors {
 /// # Panics
 /// When the scene cannot be meshed.
 pub fn factors() -> [(&'static str, Factors); 2] {
-    let scene = room();
+    let scene = cube();
     let world = World::new(&scene);
     let patches = world.mesh(PatchSize::Count(1000)).expect("a mesh");
     let n = patches.len();

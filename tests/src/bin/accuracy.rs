@@ -6,18 +6,13 @@
 //! 0.5 %; what does not depend on their number, five.
 
 use luxel_tests::accuracy::document;
+use luxel_tests::command::count_argument;
 
 /// Seeds with which a share of 95 % of the runs can be told from 90 %.
 const SEEDS: u64 = 40;
 
 fn main() -> Result<(), String> {
-    let seeds = match std::env::args().nth(1) {
-        None => SEEDS,
-        Some(text) => match text.parse() {
-            Ok(seeds) if seeds > 0 => seeds,
-            _ => return Err(format!("{text:?} is no number of seeds: 1, 2, 3, …")),
-        },
-    };
+    let seeds = count_argument("seeds", SEEDS)?;
     print!("{}", document(seeds, &mut |done| eprintln!("{done}")));
     Ok(())
 }
