@@ -184,8 +184,11 @@ impl Film {
     /// Samples for each replicate of every pixel that divide the variance of the whole film by
     /// `reduction`, at least cost, as far as its noise is known. No pixel's are more than quadrupled.
     pub fn where_noisy(&self, reduction: f64) -> Vec<u32> {
-        let noise = [0, 1, 2].map(|channel| self.channel(channel).variances());
-        let of_pixel = |pixel| (0..3).map(|channel| noise[channel][pixel]).sum();
+        let noise: Vec<Vec<f64>> = (0..3)
+            .into_par_iter()
+            .map(|channel| self.channel(channel).variances())
+            .collect();
+        let of_pixel = |pixel| noise.iter().map(|channel| channel[pixel]).sum();
         let variances: Vec<f64> = (0..self.pixels.len()).map(of_pixel).collect();
         let samples: Vec<u32> = self.pixels.iter().map(|pixel| pixel.samples).collect();
         allocation::further(&variances, &samples, reduction)
@@ -200,47 +203,55 @@ impl Film {
     pub fn expose(&mut self, further: &[u32], see: impl Fn(&[Due], &mut [Seen]) + Sync) {
         assert_eq!(further.len(), self.pixels.len(), "a number a pixel");
         let replicates = self.replicates;
+        let mut due: Vec<Exposure<'_>> = self
+            .pixels
+            .iter_mut()
+            .zip(further)
+            .enumerate()
+            .filter(|(_, (_, further))| **further > 0)
+            .map(|(index, (pixel, &further))| Exposure {
+                index,
+                pixel,
+                further,
+            })
+            .collect();
         let mut tasks = Vec::new();
-        let mut pixels = self.pixels.as_mut_slice();
-        let (mut first, mut end, mut samples) = (0, 0, 0);
-        for &more in further {
-            end += 1;
-            samples += more as usize;
-            if samples >= BATCH || end == further.len() {
-                let (task, rest) = std::mem::take(&mut pixels).split_at_mut(end - first);
-                tasks.push((first, task, &further[first..end]));
-                (pixels, first, samples) = (rest, end, 0);
-            }
+        let mut rest = due.as_mut_slice();
+        while !rest.is_empty() {
+            let mut samples = 0;
+            let mut fits = |exposure: &Exposure<'_>| {
+                let room = samples < BATCH;
+                samples += exposure.further as usize;
+                room
+            };
+            let end = rest.iter().take_while(|e| fits(e)).count();
+            let (task, others) = rest.split_at_mut(end);
+            tasks.push(task);
+            rest = others;
         }
-        tasks.into_par_iter().for_each(|(first, pixels, further)| {
-            let mut sums = vec![[Seen::default(); MAX_REPLICATES]; pixels.len()];
+        tasks.into_par_iter().for_each(|exposures| {
+            let mut sums = vec![[Seen::default(); MAX_REPLICATES]; exposures.len()];
             for replicate in 0..replicates {
-                let due =
-                    pixels
-                        .iter()
-                        .zip(further)
-                        .enumerate()
-                        .flat_map(|(slot, (pixel, &further))| {
-                            let pixels = (first + slot) as u64 * u64::from(replicates);
-                            let key = move |index| SampleKey {
-                                item: pixels + u64::from(replicate),
-                                replicate,
-                                index,
-                            };
-                            let indices = pixel.samples..pixel.samples + further;
-                            indices.map(move |index| Due {
-                                pixel: first + slot,
-                                key: key(index),
-                            })
-                        });
-                take(due, &see, |due, seen| {
-                    sums[due.pixel - first][replicate as usize] += seen;
+                let due = exposures.iter().enumerate().flat_map(|(slot, exposure)| {
+                    let before = exposure.pixel.samples;
+                    let item = exposure.index as u64 * u64::from(replicates);
+                    let due = move |index| Due {
+                        pixel: exposure.index,
+                        key: SampleKey {
+                            item: item + u64::from(replicate),
+                            replicate,
+                            index,
+                        },
+                    };
+                    let indices = before..before + exposure.further;
+                    indices.map(move |index| (slot, due(index)))
+                });
+                take(due, &see, |slot, seen| {
+                    sums[slot][replicate as usize] += seen;
                 });
             }
-            for ((pixel, sums), &further) in pixels.iter_mut().zip(&sums).zip(further) {
-                if further > 0 {
-                    pixel.add(sums, further);
-                }
+            for (exposure, sums) in exposures.iter_mut().zip(&sums) {
+                exposure.pixel.add(sums, exposure.further);
             }
         });
     }
@@ -289,20 +300,20 @@ impl Film {
         if self.replicates < 2 {
             return FilmError::default();
         }
-        let (mut level, mut noise, mut mesh) = (0.0, 0.0, 0.0);
-        for channel in 0..3 {
+        let of_channel = |channel: usize| {
             let values: Vec<f64> = self.values().map(|value| value[channel]).collect();
             let levels: Vec<f64> = values.iter().map(|value| value * value).collect();
-            level += values.iter().sum::<f64>();
-            noise += match alike {
+            let noise = match alike {
                 Alike::Neighbours => self.channel(channel).total(),
                 // Where pixels hold equally many samples, the mean of their scatters is unbiased.
                 _ => self.scatters(channel).iter().sum::<f64>(),
             };
-            mesh += discretisation(&self.differences(channel), &levels)
-                .iter()
-                .sum::<f64>();
-        }
+            let mesh = discretisation(&self.differences(channel), &levels);
+            [values.iter().sum(), noise, mesh.iter().sum()]
+        };
+        let of_channels: Vec<[f64; 3]> = (0..3).into_par_iter().map(of_channel).collect();
+        let [level, noise, mesh] =
+            [0, 1, 2].map(|part| of_channels.iter().map(|parts| parts[part]).sum::<f64>());
         let count = 3.0 * self.pixels.len() as f64;
         let relative = |square: f64| {
             if square > 0.0 {
@@ -369,25 +380,37 @@ impl Film {
     }
 }
 
-/// Lets `see` take samples, a batch at a time, and hands each with what it saw to `add`, in order.
+/// A pixel that takes further samples.
+struct Exposure<'a> {
+    index: usize,
+    pixel: &'a mut Pixel,
+    further: u32,
+}
+
+/// Lets `see` take samples, a batch at a time, and hands what each saw to `add` with its slot, in order.
 fn take(
-    mut due: impl Iterator<Item = Due>,
+    mut due: impl Iterator<Item = (usize, Due)>,
     see: impl Fn(&[Due], &mut [Seen]),
-    mut add: impl FnMut(Due, Seen),
+    mut add: impl FnMut(usize, Seen),
 ) {
+    let mut slots = Vec::with_capacity(BATCH);
     let mut batch = Vec::with_capacity(BATCH);
     let mut seen = Vec::with_capacity(BATCH);
     loop {
+        slots.clear();
         batch.clear();
-        batch.extend(due.by_ref().take(BATCH));
+        for (slot, due) in due.by_ref().take(BATCH) {
+            slots.push(slot);
+            batch.push(due);
+        }
         if batch.is_empty() {
             return;
         }
         seen.clear();
         seen.resize(batch.len(), Seen::default());
         see(&batch, &mut seen);
-        for (&due, &seen) in batch.iter().zip(&seen) {
-            add(due, seen);
+        for (&slot, &seen) in slots.iter().zip(&seen) {
+            add(slot, seen);
         }
     }
 }

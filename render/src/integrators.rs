@@ -23,6 +23,7 @@ use luxel_solver::gather::MAX_REPLICATES;
 use luxel_solver::sampling::{Sequence, Stage};
 use luxel_solver::world::World;
 use std::ops::{AddAssign, Mul};
+pub(crate) use vertex::Vertex;
 
 /// A camera ray in the unit frame. An eye far outside the scene is moved along its ray to where the
 /// scene's surroundings begin, so that f32 holds its position.
@@ -38,7 +39,7 @@ pub(crate) fn unit_ray(world: &World<'_>, ray: &CameraRay) -> Ray {
 }
 
 /// The first hit of each camera ray, with the rays in the unit frame.
-fn cast(world: &World<'_>, rays: &[CameraRay]) -> (Vec<Ray>, Vec<Hit>) {
+pub(crate) fn cast(world: &World<'_>, rays: &[CameraRay]) -> (Vec<Ray>, Vec<Hit>) {
     let rays: Vec<Ray> = rays.iter().map(|ray| unit_ray(world, ray)).collect();
     let mut hits = vec![Hit::MISS; rays.len()];
     world.bvh().closest_hits(&rays, &mut hits);

@@ -30,6 +30,8 @@ pub mod pilot;
 
 pub mod subdivision;
 
+pub mod field;
+
 pub mod gather;
 
 pub mod adaptive;

@@ -28,7 +28,7 @@ use clap::ValueEnum;
 use luxel_scenes::{Irradiance, Rgb};
 use luxel_solver::audit;
 use luxel_solver::world::World;
-use prepare::{Prepared, prepare};
+use prepare::{Prepared, indirect_field, prepare};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
@@ -40,7 +40,7 @@ const FINER: usize = 4;
 const MOST_PATCHES: usize = 1_000_000;
 
 /// Samples of a pixel that a refinement begins with.
-const FIRST_SAMPLES: u32 = 8;
+const FIRST_SAMPLES: u32 = 4;
 
 /// Rays for ambient occlusion of a camera sample.
 const AO_RAYS: u32 = 8;
@@ -243,12 +243,20 @@ impl Render {
                     mut lookup,
                     mut patches,
                     config,
+                    field_error,
                 }) = prepare(world, frame, goal, context)?
                 else {
                     return Ok(None);
                 };
                 loop {
-                    let gatherer = Gatherer::new(world, &lookup, config);
+                    let field = field_error.and_then(|error| {
+                        let mut steering = Steering::new(context, goal);
+                        indirect_field(world, &lookup, frame, config, error, &mut steering)
+                    });
+                    let mut gatherer = Gatherer::new(world, &lookup, config);
+                    if let Some(field) = &field {
+                        gatherer = gatherer.with_field(field);
+                    }
                     // What a bound on E leaves of L = ρE/π, for ρ up to one.
                     let solver_bound = lookup.solver_bound() / PI;
                     let shown = if self.integrator == Method::Gather {

@@ -2,16 +2,17 @@
 //!
 //! L = L_e + ρE/π at the first hit, with E the irradiance that [`luxel_solver::gather`] finds
 //! there: direct light exact up to its sampled visibility, indirect light by rays into a coarse
-//! radiosity solution. Mirrors and glass are not followed here (see [`super::whitted`]); their
+//! radiosity solution, or from a field of it ([`IndirectField`]) where one is known. Mirrors and glass are not followed here (see [`super::whitted`]); their
 //! diffuse part is shown. Every replicate of a pixel looks up a radiosity solution of its own, so
 //! that the film's standard error holds the noise of the solution, too. Biased by the finite size
-//! of the patches alone. Cost: rays + shadow rays for each camera sample.
+//! of the patches, and of the polynomials of a field, whose noise is stated the wider for it. Cost: rays + shadow
+//! rays for each camera sample, shadow rays alone where there is a field.
 
 use super::vertex::Vertex;
 use super::{Integrator, SampleKey, Seen, background, cast};
 use crate::camera::CameraRay;
 use luxel_solver::gather::{
-    Components, GatherConfig, Key, Lookup, SkyRays, Solutions, Tally, gather,
+    Components, GatherConfig, IndirectField, Key, Lookup, SkyRays, Solutions, Tally, gather,
 };
 use luxel_solver::world::{Receiver, World};
 
@@ -26,10 +27,20 @@ pub struct Config {
     pub seed: u64,
 }
 
+/// Where the indirect light at a hit comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum IndirectLight {
+    /// Gather rays of its own.
+    Gathered,
+    /// A field.
+    Known,
+}
+
 /// Irradiance at hits, from radiosity solutions.
 pub struct Gatherer<'w> {
     world: &'w World<'w>,
     lookup: &'w Lookup,
+    field: Option<&'w IndirectField>,
     config: Config,
 }
 
@@ -40,12 +51,39 @@ impl<'w> Gatherer<'w> {
         Self {
             world,
             lookup,
+            field: None,
             config,
         }
     }
 
+    /// Takes indirect light from a field where it knows it.
+    #[must_use]
+    pub fn with_field(mut self, field: &'w IndirectField) -> Self {
+        self.field = Some(field);
+        self
+    }
+
+    /// Mean radiance along some camera rays and over the channels, roughly.
+    pub(crate) fn level(&self, rays: &[CameraRay]) -> f64 {
+        let key = |item| SampleKey {
+            item,
+            replicate: 0,
+            index: 0,
+        };
+        let keys: Vec<SampleKey> = (0..rays.len() as u64).map(key).collect();
+        let mut seen = vec![Seen::default(); rays.len()];
+        self.estimate(rays, &keys, &mut seen);
+        let sum: f64 = seen.iter().map(|seen| seen.value.element_sum()).sum();
+        sum / (3.0 * rays.len().max(1) as f64)
+    }
+
     /// What is gathered at each receiver. The samples of all keys belong to one replicate.
-    fn gather(&self, receivers: &[Receiver], keys: &[SampleKey]) -> Vec<Tally> {
+    fn gather(
+        &self,
+        receivers: &[Receiver],
+        keys: &[SampleKey],
+        indirect: IndirectLight,
+    ) -> Vec<Tally> {
         let Some(first) = keys.first() else {
             return Vec::new();
         };
@@ -57,7 +95,10 @@ impl<'w> Gatherer<'w> {
             })
             .collect();
         let config = GatherConfig {
-            rays: self.config.rays,
+            rays: match indirect {
+                IndirectLight::Gathered => self.config.rays,
+                IndirectLight::Known => 0,
+            },
             rays_before: 0,
             shadow_rays: self.config.shadow_rays,
             sky: SkyRays::Gather,
@@ -69,26 +110,50 @@ impl<'w> Gatherer<'w> {
         gather(self.world, Some(self.lookup), receivers, &keys, &config)
     }
 
-    /// Adds ρE/π of every diffuse vertex to what its slot sees.
+    /// Adds ρE/π of every diffuse vertex to what its slot sees. All samples belong to one replicate.
     pub(super) fn add_reflected(
         &self,
         vertices: &[(usize, SampleKey, Vertex<'_>)],
         seen: &mut [Seen],
     ) {
-        let lit: Vec<_> = vertices
-            .iter()
-            .map(|(slot, key, vertex)| (*slot, *key, vertex.reflectance(), vertex.receiver()))
-            .filter(|(_, _, reflectance, _)| reflectance.0.max_element() > 0.0)
-            .collect();
-        let receivers: Vec<Receiver> = lit.iter().map(|(.., receiver)| *receiver).collect();
-        let keys: Vec<SampleKey> = lit.iter().map(|(_, key, ..)| *key).collect();
-        let tallies = self.gather(&receivers, &keys);
-        for ((slot, _, reflectance, _), tally) in lit.iter().zip(tallies) {
-            let radiance = |irradiance| (*reflectance * irradiance).to_radiance().0;
-            seen[*slot] += Seen {
-                value: radiance(tally.irradiance()),
-                mesh_difference: radiance(tally.mesh_difference()),
+        let mut gathered = Vec::new();
+        let mut known = Vec::new();
+        for (slot, key, vertex) in vertices {
+            let reflectance = vertex.reflectance();
+            if reflectance.0.max_element() <= 0.0 {
+                continue;
+            }
+            let receiver = vertex.receiver();
+            let lit = (*slot, *key, reflectance, receiver);
+            let replicate = key.replicate as usize % self.lookup.solutions();
+            let field = self
+                .field
+                .and_then(|field| field.at(receiver.position, receiver.normal, replicate));
+            let Some([irradiance, difference]) = field else {
+                gathered.push(lit);
+                continue;
             };
+            let radiance = |irradiance| (reflectance * irradiance).to_radiance().0;
+            seen[*slot] += Seen {
+                value: radiance(irradiance),
+                mesh_difference: radiance(difference),
+            };
+            known.push(lit);
+        }
+        for (lit, indirect) in [
+            (gathered, IndirectLight::Gathered),
+            (known, IndirectLight::Known),
+        ] {
+            let receivers: Vec<Receiver> = lit.iter().map(|(.., receiver)| *receiver).collect();
+            let keys: Vec<SampleKey> = lit.iter().map(|(_, key, ..)| *key).collect();
+            let tallies = self.gather(&receivers, &keys, indirect);
+            for ((slot, _, reflectance, _), tally) in lit.iter().zip(tallies) {
+                let radiance = |irradiance| (*reflectance * irradiance).to_radiance().0;
+                seen[*slot] += Seen {
+                    value: radiance(tally.irradiance()),
+                    mesh_difference: radiance(tally.mesh_difference()),
+                };
+            }
         }
     }
 }

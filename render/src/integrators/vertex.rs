@@ -9,10 +9,10 @@ use luxel_solver::world::{Interaction, Receiver, World};
 
 /// A point where a ray met a surface. Vectors are in the unit frame.
 #[derive(Clone, Copy)]
-pub(super) struct Vertex<'w> {
+pub(crate) struct Vertex<'w> {
     world: &'w World<'w>,
     /// Where it is.
-    pub(super) interaction: Interaction,
+    pub(crate) interaction: Interaction,
     /// Unit direction back along the ray.
     pub(super) view: DVec3,
     /// Unit shading normal, to the side of the ray.
@@ -21,7 +21,7 @@ pub(super) struct Vertex<'w> {
 
 impl<'w> Vertex<'w> {
     /// The vertex of a hit; `None` for a miss.
-    pub(super) fn new(world: &'w World<'w>, ray: &Ray, hit: &Hit) -> Option<Self> {
+    pub(crate) fn new(world: &'w World<'w>, ray: &Ray, hit: &Hit) -> Option<Self> {
         let interaction = world.interaction(ray, hit)?;
         let front = world.surfaces().shading_normal(interaction.point);
         Some(Self {
@@ -41,7 +41,7 @@ impl<'w> Vertex<'w> {
     }
 
     /// The vertex as a receiver of diffuse light, about its shading normal.
-    pub(super) fn receiver(&self) -> Receiver {
+    pub(crate) fn receiver(&self) -> Receiver {
         Receiver {
             normal: self.shading_normal,
             ..self.interaction.receiver
@@ -69,7 +69,7 @@ impl<'w> Vertex<'w> {
     }
 
     /// Diffuse reflectance on this side; zero on the back of a one-sided face.
-    pub(super) fn reflectance(&self) -> Reflectance {
+    pub(crate) fn reflectance(&self) -> Reflectance {
         if self.is_lit_side() {
             self.world.surfaces().reflectance(self.interaction.point)
         } else {

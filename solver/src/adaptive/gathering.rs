@@ -1,16 +1,19 @@
 //! Receivers with what has been gathered at them, round after round: gather rays are added to those that
 //! were cast, shadow rays are cast anew.
 
+use super::budget::JOINED_FROM;
 use super::{Adaptive, AdaptiveConfig, Budget, Control, Ending, Stage};
 use crate::gather::{
     GatherConfig, Key, Lookup, MAX_REPLICATES, SkyRays, Solutions, Tally, error_parts, gather,
+    joined,
 };
 use crate::world::{Receiver, World};
 
 /// Independent gathers when there are receivers enough to tell the noise together, and the fewest such
 /// receivers. The more gathers share the rays, the less evenly each fills the hemisphere: with two
 /// instead of four the error of bare rooms is 15 % smaller, of a furnished office 7 %; with one it
-/// would not be known.
+/// would not be known. Joined receivers have four: cells follow from the noise of a few neighbours, which
+/// the differences of two gathers tell badly (a third too little was stated).
 const GATHERS: usize = 2;
 const MANY_RECEIVERS: usize = 64;
 
@@ -21,10 +24,10 @@ const RAYS_OF_PART: usize = 1 << 19;
 
 /// Independent gathers of so many receivers.
 pub(super) fn gathers(receivers: usize) -> usize {
-    if receivers < MANY_RECEIVERS {
-        MAX_REPLICATES
-    } else {
+    if (MANY_RECEIVERS..JOINED_FROM).contains(&receivers) {
         GATHERS
+    } else {
+        MAX_REPLICATES
     }
 }
 
@@ -57,9 +60,14 @@ impl<'a> Gathering<'a> {
 
     /// What there is now.
     pub(super) fn state(&self, lookup: Option<&Lookup>) -> Adaptive {
+        let tallies = if self.receivers.len() >= JOINED_FROM {
+            joined(self.receivers, &self.tallies)
+        } else {
+            self.tallies.clone()
+        };
         Adaptive {
-            tallies: self.tallies.clone(),
-            parts: error_parts(&self.tallies),
+            parts: error_parts(&tallies),
+            tallies,
             solver_bound: lookup.map_or(0.0, Lookup::solver_bound),
             budget: self.spent,
             patches: lookup.map_or(0, |lookup| lookup.patches().len()),

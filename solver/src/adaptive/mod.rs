@@ -11,20 +11,25 @@
 //!    ([`ErrorParts::upper`]) is within the error. Gather rays are kept: their sequences go on. Only where
 //!    rays cannot make up for the mesh a new one is made, and begins a new gather.
 //!
+//! Many receivers are joined in the planes that they lie in ([`crate::gather::joined`]) before their errors are
+//! measured: each then needs few rays.
+//!
 //! Every decision follows from sampled values, never from a clock, so that the result is the same at
 //! any thread count; a [`Control`] that measures time may end the work earlier.
 
 mod adapted;
 mod budget;
 mod gathering;
+mod indirect_field;
 
 pub use adapted::Adapted;
 pub use budget::{Budget, Mesh, ROW_RAYS, fewest_rays};
+pub use indirect_field::FieldGather;
 
 use crate::gather::{Components, ErrorParts, Tally};
 use crate::pilot::PilotError;
 use crate::world::{Receiver, World};
-use budget::even;
+use budget::{JOINED_FROM, even, least_rays};
 use gathering::{Gathering, gathers};
 
 /// How far below the error asked for the budget is planned from a pilot, which knows its parts to a tenth
@@ -36,6 +41,9 @@ const MARGIN: f64 = 1.03;
 /// Share of the planned gather rays that are cast first: the rest follows from what they tell. Smaller,
 /// and the second plan knows no more than the first; larger, and more rays are cast in vain.
 const FIRST_SHARE: f64 = 0.5;
+
+/// The same where receivers are joined: the pilot does not know how much that lessens the noise.
+const FIRST_SHARE_JOINED: f64 = 0.25;
 
 /// The largest growth of the gather rays in a round: where an error is out of reach no number suffices.
 const RAY_GROWTH: usize = 4;
@@ -139,8 +147,13 @@ pub fn irradiance(
         let scene = adapted.insert(Adapted::new(world, config.seed)?);
         match scene.prepare(receivers, receivers.len(), config, control)? {
             Some((solved, planned)) => {
-                let fewest = first_budget(world, error, receivers.len()).rays;
-                let first = even(FIRST_SHARE * planned.rays as f64).max(fewest);
+                let (share, fewest) = if receivers.len() >= JOINED_FROM {
+                    (FIRST_SHARE_JOINED, least_rays(receivers.len()))
+                } else {
+                    let fewest = first_budget(world, error, receivers.len()).rays;
+                    (FIRST_SHARE, fewest)
+                };
+                let first = even(share * planned.rays as f64).max(fewest);
                 let rays = first.min(planned.rays);
                 (lookup, budget) = (Some(solved), Budget { rays, ..planned });
             }
@@ -180,7 +193,7 @@ pub fn irradiance(
         next = Budget {
             patches: next.patches,
             rays: next.rays.clamp(spent.rays, RAY_GROWTH * spent.rays),
-            shadow_rays: next.shadow_rays.max(spent.shadow_rays),
+            shadow_rays: further_shadow_rays(next.shadow_rays, spent.shadow_rays),
         };
         if next == gathering.spent {
             result.ending = Ending::OutOfReach;
@@ -235,6 +248,18 @@ impl Adaptive {
             patches: 0,
             ending: Ending::Stopped,
         }
+    }
+}
+
+/// Shadow rays of the next round, all of which are cast anew: those of the last one will do where only a few
+/// more would be better.
+fn further_shadow_rays(planned: usize, spent: usize) -> usize {
+    /// Growth below which the gather rays make up for what is missing.
+    const WORTHWHILE: f64 = 1.3;
+    if planned as f64 > WORTHWHILE * spent as f64 {
+        planned
+    } else {
+        spent
     }
 }
 

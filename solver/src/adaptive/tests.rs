@@ -1,6 +1,9 @@
 //! The loop, on a scene with a known answer and under a control that stops it anywhere.
 
 use super::*;
+use crate::gather::{
+    GatherConfig, Gathered, Key, MAX_REPLICATES, SkyRays, Solutions, finish, gather,
+};
 use luxel_scenes::generate;
 
 /// Allows everything until `left` calls were made; is satisfied with an error.
@@ -79,4 +82,133 @@ fn it_may_be_stopped_anywhere_and_keeps_the_last_complete_state() {
             assert_eq!(stopped.tallies, complete.tallies);
         }
     }
+}
+
+/// Receivers on a grid on the floor of the Cornell box, some of them below the boxes' shadows, none below a box.
+fn on_the_floor(world: &World, side: usize) -> Vec<Receiver> {
+    let at = |i: usize| (i as f64 + 0.5) / side as f64;
+    let positions: Vec<_> = (0..side * side)
+        .map(|i| glam::DVec3::new(0.02 + 0.51 * at(i % side), 0.0, 0.01 + 0.04 * at(i / side)))
+        .collect();
+    world.receivers(&positions, &vec![glam::DVec3::Y; side * side])
+}
+
+fn unlimited(error: f64) -> Counted {
+    Counted {
+        left: usize::MAX,
+        error,
+        rounds: 0,
+    }
+}
+
+/// The root mean square, over some receivers, of differences over what they are stated to be.
+fn over_stated(some: &[Gathered], exact: &[Gathered]) -> f64 {
+    let squares = some.iter().zip(exact).map(|(a, b)| {
+        let difference = (a.irradiance().0 - b.irradiance().0).element_sum();
+        let stated = [a, b].map(|g| g.standard_error().0.element_sum().powi(2));
+        difference * difference / (stated[0] + stated[1])
+    });
+    (squares.sum::<f64>() / some.len() as f64).sqrt()
+}
+
+#[test]
+fn many_receivers_share_few_rays_and_are_right() {
+    const SEEDS: u64 = 4;
+    let scene = generate::cornell_box();
+    let world = World::new(&scene);
+    let receivers = on_the_floor(&world, 70);
+    let stride = 49;
+    let some: Vec<Receiver> = receivers.iter().copied().step_by(stride).collect();
+    let at_some = |error: f64, seed: u64, receivers: &[Receiver]| {
+        let config = AdaptiveConfig {
+            error,
+            components: Components::All,
+            seed,
+        };
+        let found = irradiance(&world, receivers, &config, &mut unlimited(error));
+        let found = found.expect("a scene");
+        assert_eq!(found.ending, Ending::Reached);
+        found
+    };
+    let exact = finish(&at_some(0.003, 99, &some).tallies);
+    let mut square = 0.0;
+    for seed in 0..SEEDS {
+        let joined = at_some(0.02, seed, &receivers);
+        // Alone, a receiver needs some 300 gather rays for 2 %.
+        assert!(joined.budget.rays <= 100, "{:?}", joined.budget);
+        let all = finish(&joined.tallies);
+        let ours: Vec<Gathered> = all.into_iter().step_by(stride).collect();
+        square += over_stated(&ours, &exact).powi(2) / SEEDS as f64;
+    }
+    // Errors of neighbours are alike: the hundred are worth about the twenty cells that they lie in, and four times
+    // as many know the rms to a tenth; channels share their rays, so that their sum is stated on the safe side.
+    assert!((0.6..1.25).contains(&square.sqrt()), "{}", square.sqrt());
+}
+
+#[test]
+fn a_field_is_as_exact_as_it_says() {
+    let scene = generate::cornell_box();
+    let world = World::new(&scene);
+    let receivers = on_the_floor(&world, 64);
+    let adapted = Adapted::new(&world, 1).expect("a scene");
+    let lookup = adapted.solve(2000, &mut unlimited(0.0)).expect("a scene");
+    let lookup = lookup.expect("nothing stops it");
+    let weights = vec![luxel_scenes::Rgb::ONE; receivers.len()];
+    let error = 0.004;
+    let field = FieldGather::new(&world, &lookup, &receivers, 5)
+        .until(error, &weights, &mut unlimited(0.0))
+        .expect("nothing stops it");
+    assert!(field.gather_noise(&receivers, &weights) <= 1.1 * error);
+
+    let some: Vec<Receiver> = receivers.iter().copied().step_by(41).collect();
+    let keys: Vec<Key> = (0..some.len() as u64).map(Key::of).collect();
+    let config = GatherConfig {
+        rays: 8192,
+        rays_before: 0,
+        shadow_rays: 0,
+        sky: SkyRays::Gather,
+        gathers: MAX_REPLICATES,
+        solutions: Solutions::All,
+        components: Components::All,
+        seed: 9,
+    };
+    let exact = gather(&world, Some(&lookup), &some, &keys, &config);
+    let mut squares = 0.0;
+    for (receiver, tally) in some.iter().zip(&exact) {
+        let replicate = |r| field.at(receiver.position, receiver.normal, r);
+        let light = (0..MAX_REPLICATES).map(|r| replicate(r).expect("known")[0].0);
+        let mean = light.sum::<luxel_scenes::Rgb>() / MAX_REPLICATES as f64;
+        squares += (mean - tally.irradiance().0).length_squared() / 3.0;
+    }
+    let made = (squares / some.len() as f64).sqrt();
+    // About ten cells, which share their noise: known to a quarter; half of it more for 95 %.
+    assert!(
+        (0.4 * error..1.5 * error).contains(&made),
+        "{made} of {error}"
+    );
+    // Between the receivers, too, but not apart from them.
+    let between = receivers[0].position + glam::DVec3::new(1e-4, 0.0, 1e-4);
+    assert!(field.at(between, receivers[0].normal, 0).is_some());
+    assert!(field.at(between, -receivers[0].normal, 0).is_none());
+}
+
+/// Decisions follow from values alone.
+#[test]
+fn joined_receivers_are_the_same_at_any_number_of_threads() {
+    let scene = generate::cornell_box();
+    let world = World::new(&scene);
+    let receivers = on_the_floor(&world, 66);
+    let config = AdaptiveConfig {
+        error: 0.1,
+        components: Components::All,
+        seed: 4,
+    };
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let pool = pool.build().expect("a few threads");
+        let run = || irradiance(&world, &receivers, &config, &mut unlimited(0.1));
+        pool.install(run).expect("a scene").tallies
+    };
+    let (one, three) = (with(1), with(3));
+    assert!(!one.is_empty() && one == three);
 }

@@ -2,6 +2,7 @@
 //!
 //! With σ_i² the variance of receiver i, its noise adds a square of mean σ_i² and variance 2 σ_i⁴ to the error
 //! that is made, and one of variance 2 σ_i⁴/d to that which is stated from d degrees of freedom. The noise
+//! of n receivers that share theirs adds n times as much (the covariances σ⁴ of all pairs), that
 //! of solutions is counted as common to all receivers, the largest that it can vary, and the square of the
 //! mesh's part as known to a factor of two.
 //!
@@ -74,8 +75,9 @@ pub fn error_parts(tallies: &[Tally]) -> ErrorParts {
     let mut own = vec![0.0; tallies.len()];
     for channel in 0..3 {
         let raw = Scatters::new(tallies, &gathered, channel);
-        for (own, noise) in own.iter_mut().zip(raw.direct.iter().zip(&raw.gather)) {
-            *own += noise.0 + noise.1;
+        let noises = raw.direct.iter().zip(&raw.gather).zip(tallies);
+        for (own, ((direct, gather), tally)) in own.iter_mut().zip(noises) {
+            *own += direct + gather * tally.shared.max(1.0).sqrt();
         }
         let parts = [
             &raw.direct,

@@ -18,11 +18,13 @@
 //! furnished room continue once.
 
 mod error_parts;
+mod joined;
 mod lookup;
 mod near_chain;
 mod tally;
 
 pub use error_parts::{ErrorParts, error_parts};
+pub use joined::{IndirectField, joined};
 pub use lookup::{Lookup, MAX_REPLICATES, Solutions};
 pub use tally::{Gathered, Tally, finish};
 

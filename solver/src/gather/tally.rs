@@ -42,6 +42,9 @@ pub struct Tally {
     pub(super) gathers: u8,
     /// Solutions.
     pub(super) solutions: u8,
+    /// Receivers that share the noise of the gather rays with this one, itself included, once they are
+    /// joined; zero before.
+    pub(super) shared: f64,
 }
 
 /// Irradiance at a receiver with its error.
