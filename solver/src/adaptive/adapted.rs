@@ -3,7 +3,8 @@
 use super::budget::{self, JOINED_FROM};
 use super::gathering::{Gathering, gathers};
 use super::{
-    AdaptiveConfig, Budget, Control, Mesh, ROW_RAYS, SAFETY, Stage, WORTHWHILE, first_budget, plan,
+    AdaptiveConfig, Budget, Changes, Control, ROW_RAYS, SAFETY, Stage, WORTHWHILE, first_budget,
+    plan,
 };
 use crate::gather::{Lookup, MAX_REPLICATES, error_parts};
 use crate::patches::{Density, Patches};
@@ -126,7 +127,7 @@ impl<'w, 's> Adapted<'w, 's> {
             if count >= JOINED_FROM {
                 parts.gather /= USUAL_GAIN;
             }
-            let planned = plan(self.world, &pilot, error, &parts, count, Mesh::Free);
+            let planned = plan(self.world, &pilot, error, &parts, count, Changes::All);
             if planned.patches as f64 <= WORTHWHILE * pilot.patches as f64 {
                 let patches = pilot.patches;
                 return Ok(Some((lookup, Budget { patches, ..planned })));

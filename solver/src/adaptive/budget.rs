@@ -25,13 +25,15 @@ pub struct Budget {
     pub shadow_rays: usize,
 }
 
-/// Whether a budget may have another mesh.
+/// What of a budget may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mesh {
-    /// As many patches as are cheapest.
-    Free,
-    /// The patches that there are: what rays were gathered stays.
-    Kept,
+pub enum Changes {
+    /// Mesh and rays.
+    All,
+    /// Rays: those that were gathered in the mesh stay.
+    Rays,
+    /// Gather rays alone: no shadow rays are cast anew.
+    GatherRays,
 }
 
 /// Rays of a patch's row in each solution. 64 measured no better per ray; 16 biases the near
@@ -106,12 +108,22 @@ impl Budget {
 
     /// The cheapest budget for a relative error, from the errors that this one had.
     #[must_use]
-    pub fn for_error(self, error: f64, parts: &ErrorParts, receivers: usize, mesh: Mesh) -> Self {
-        let patches = match mesh {
-            Mesh::Free => PATCHES,
-            Mesh::Kept => [self.patches; 2],
-        };
+    pub fn for_error(
+        self,
+        error: f64,
+        parts: &ErrorParts,
+        receivers: usize,
+        changes: Changes,
+    ) -> Self {
         let fewest = fewest_rays(receivers);
+        let patches = match changes {
+            Changes::All => PATCHES,
+            Changes::Rays | Changes::GatherRays => [self.patches; 2],
+        };
+        let shadow_rays = match changes {
+            Changes::All | Changes::Rays => [fewest.max(SHADOW_RAYS[0]), SHADOW_RAYS[1]],
+            Changes::GatherRays => [self.shadow_rays; 2],
+        };
         let least_rays = least_rays(receivers);
         let receivers = receivers as f64;
         let items = [
@@ -134,7 +146,7 @@ impl Budget {
                 spent: self.shadow_rays as f64,
                 parts: vec![(parts.direct.powi(2), SHADOW_EXPONENT)],
                 cost: receivers * SHADOW_RAY_COST,
-                limits: [fewest.max(SHADOW_RAYS[0]), SHADOW_RAYS[1]],
+                limits: shadow_rays,
             },
         ];
         let wanted = error * error;
@@ -163,6 +175,18 @@ impl Budget {
     /// Time of the rays of some receivers, in units of gather rays.
     pub(super) fn gather_cost(&self, receivers: usize) -> f64 {
         receivers as f64 * (self.rays as f64 + SHADOW_RAY_COST * self.shadow_rays as f64)
+    }
+
+    /// Rays that are to be cast after so many, for each receiver, in units of gather rays: shadow rays are cast
+    /// anew.
+    pub(super) fn further_cost(&self, spent: &Self) -> f64 {
+        let shadow_rays = if self.shadow_rays > spent.shadow_rays {
+            self.shadow_rays
+        } else {
+            0
+        };
+        let rays = self.rays.saturating_sub(spent.rays);
+        rays as f64 + SHADOW_RAY_COST * shadow_rays as f64
     }
 
     /// A share of the rays.
@@ -278,7 +302,7 @@ mod tests {
     #[test]
     fn the_budget_meets_the_error_and_no_cheaper_one_does() {
         for error in [0.02, 0.01, 0.005, 0.001] {
-            let best = SPENT.for_error(error, &PARTS, 1000, Mesh::Free);
+            let best = SPENT.for_error(error, &PARTS, 1000, Changes::All);
             // Rounding up to whole rays gains less than a hundredth.
             assert!(
                 (0.99 * error..=error).contains(&predicted(best)),
@@ -303,25 +327,41 @@ mod tests {
 
     #[test]
     fn a_mesh_that_is_kept_leaves_the_rest_to_rays() {
-        let kept = SPENT.for_error(0.01, &PARTS, 1000, Mesh::Kept);
+        let kept = SPENT.for_error(0.01, &PARTS, 1000, Changes::Rays);
         assert_eq!(kept.patches, SPENT.patches);
         assert!((0.0099..=0.01).contains(&predicted(kept)), "{kept:?}");
-        let free = SPENT.for_error(0.01, &PARTS, 1000, Mesh::Free);
+        let free = SPENT.for_error(0.01, &PARTS, 1000, Changes::All);
         assert!(kept.rays > free.rays && free.patches > kept.patches);
+    }
+
+    #[test]
+    fn shadow_rays_that_are_kept_leave_the_rest_to_gather_rays() {
+        let both = SPENT.for_error(0.01, &PARTS, 1000, Changes::Rays);
+        let kept = SPENT.for_error(0.01, &PARTS, 1000, Changes::GatherRays);
+        assert_eq!(kept.shadow_rays, SPENT.shadow_rays);
+        assert!(kept.rays > both.rays);
+        let cost = |budget: Budget| budget.further_cost(&SPENT);
+        assert!(cost(SPENT).abs() < 1e-9);
+        assert!((cost(kept) - (kept.rays - SPENT.rays) as f64).abs() < 1e-9);
+        assert!(cost(both) > SHADOW_RAY_COST * both.shadow_rays as f64);
+        // What shadow rays leave is more than the error: no number of gather rays suffices, and any other
+        // budget is cheaper.
+        let beyond = SPENT.for_error(0.5 * PARTS.direct, &PARTS, 1000, Changes::GatherRays);
+        assert!(beyond.rays > 100 * kept.rays, "{beyond:?}");
     }
 
     #[test]
     fn parts_without_error_cost_the_least_possible() {
         let none = ErrorParts::default();
         for (receivers, rays) in [(4000, RAYS[0]), (10_000, JOINED_RAYS)] {
-            let least = SPENT.for_error(0.01, &none, receivers, Mesh::Free);
+            let least = SPENT.for_error(0.01, &none, receivers, Changes::All);
             assert_eq!(
                 (least.patches, least.rays, least.shadow_rays),
                 (PATCHES[0], rays, SHADOW_RAYS[0])
             );
         }
         // What cannot be reached is approached as far as it goes.
-        let most = SPENT.for_error(1e-9, &PARTS, 10, Mesh::Free);
+        let most = SPENT.for_error(1e-9, &PARTS, 10, Changes::All);
         assert_eq!(most.rays, RAYS[1]);
     }
 }

@@ -23,7 +23,7 @@ mod gathering;
 mod indirect_field;
 
 pub use adapted::Adapted;
-pub use budget::{Budget, Mesh, ROW_RAYS, fewest_rays};
+pub use budget::{Budget, Changes, ROW_RAYS, fewest_rays};
 pub use indirect_field::FieldGather;
 
 use crate::gather::{Components, ErrorParts, Tally};
@@ -175,13 +175,14 @@ pub fn irradiance(
         // More is wanted than was planned for: half of what was reached.
         error = if total <= error { 0.5 * total } else { error };
         let count = receivers.len();
-        let plan = |mesh| plan(world, &gathering.spent, error, &result.parts, count, mesh);
-        let mut next = plan(Mesh::Kept);
+        let spent = gathering.spent;
+        let plan = |changes| plan(world, &spent, error, &result.parts, count, changes);
+        let mut next = cheaper(plan(Changes::Rays), plan(Changes::GatherRays), &spent);
         // A new mesh begins a new gather: only where rays cannot make up for the old one.
         let fixed = result.parts.solution.hypot(result.parts.mesh);
         let mut solved = None;
         if let Some(scene) = adapted.as_ref().filter(|_| fixed > MESH_SHARE * error) {
-            let free = plan(Mesh::Free);
+            let free = plan(Changes::All);
             if free.patches > budget.patches {
                 let worthwhile = (WORTHWHILE * budget.patches as f64) as usize;
                 let patches = free.patches.max(worthwhile);
@@ -189,13 +190,12 @@ pub fn irradiance(
                 solved = scene.solve(patches, control)?;
             }
         }
-        let spent = gathering.spent;
         next = Budget {
             patches: next.patches,
             rays: next.rays.clamp(spent.rays, RAY_GROWTH * spent.rays),
-            shadow_rays: further_shadow_rays(next.shadow_rays, spent.shadow_rays),
+            shadow_rays: next.shadow_rays.max(spent.shadow_rays),
         };
-        if next == gathering.spent {
+        if next == spent {
             result.ending = Ending::OutOfReach;
             return Ok(result);
         }
@@ -251,15 +251,12 @@ impl Adaptive {
     }
 }
 
-/// Shadow rays of the next round, all of which are cast anew: those of the last one will do where only a few
-/// more would be better.
-fn further_shadow_rays(planned: usize, spent: usize) -> usize {
-    /// Growth below which the gather rays make up for what is missing.
-    const WORTHWHILE: f64 = 1.3;
-    if planned as f64 > WORTHWHILE * spent as f64 {
-        planned
+/// Of two budgets the one that takes fewer rays after what was spent.
+fn cheaper(one: Budget, other: Budget, spent: &Budget) -> Budget {
+    if other.further_cost(spent) < one.further_cost(spent) {
+        other
     } else {
-        spent
+        one
     }
 }
 
@@ -286,9 +283,9 @@ fn plan(
     error: f64,
     parts: &ErrorParts,
     receivers: usize,
-    mesh: Mesh,
+    changes: Changes,
 ) -> Budget {
-    let mut planned = spent.for_error(error, parts, receivers, mesh);
+    let mut planned = spent.for_error(error, parts, receivers, changes);
     if world.lights().has_sky() {
         let most = spent.shadow_rays * SKY_GROWTH;
         planned.shadow_rays = planned.shadow_rays.clamp(FIRST_SKY_RAYS, most);
