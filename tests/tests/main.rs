@@ -6,6 +6,7 @@ mod bad_input;
 mod cie171;
 mod determinism;
 mod enclosures;
+mod extremes;
 mod form_factors;
 mod golden;
 mod hard_cases;

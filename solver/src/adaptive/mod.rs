@@ -177,7 +177,10 @@ pub fn irradiance(
         let count = receivers.len();
         let spent = gathering.spent;
         let plan = |changes| plan(world, &spent, error, &result.parts, count, changes);
-        let mut next = cheaper(plan(Changes::Rays), plan(Changes::GatherRays), &spent);
+        let mut next = plan(Changes::Rays);
+        if count >= JOINED_FROM {
+            next = cheaper(next, plan(Changes::GatherRays), &spent);
+        }
         // A new mesh begins a new gather: only where rays cannot make up for the old one.
         let fixed = result.parts.solution.hypot(result.parts.mesh);
         let mut solved = None;
@@ -251,7 +254,8 @@ impl Adaptive {
     }
 }
 
-/// Of two budgets the one that takes fewer rays after what was spent.
+/// Of two budgets the one that takes fewer rays after what was spent. Few receivers do without: shadow rays that
+/// are cast anew cost them little and leave room for what is not stated (furnished rooms).
 fn cheaper(one: Budget, other: Budget, spent: &Budget) -> Budget {
     if other.further_cost(spent) < one.further_cost(spent) {
         other

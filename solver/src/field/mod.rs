@@ -94,7 +94,7 @@ impl Cells {
     ///
     /// n residuals tell the p σ² that the bias adds to their sum of squares only as well as they tell σ²,
     /// within σ² √(2n (1 + 1/d)) with d degrees of freedom in each variance. b is therefore the mean of what
-    /// they tell and of [`USUAL_BIAS`], weighted by their precisions.
+    /// they tell and of what is usual, weighted by their precisions.
     pub fn widening(&self, degrees: u32) -> f64 {
         let mut all = Excess::default();
         for tree in self.trees.iter().flatten() {

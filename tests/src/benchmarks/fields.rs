@@ -32,7 +32,7 @@ pub struct Field {
     pub stated: f64,
 }
 
-/// Probes a scene `runs` times at [`POINTS`] points for an error of `percent`.
+/// Probes a scene `runs` times at a hundred thousand points for an error of `percent`.
 ///
 /// # Panics
 /// When the command fails, other than by missing the error.

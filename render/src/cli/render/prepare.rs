@@ -97,8 +97,8 @@ pub(super) fn prepare<'w, 's>(
     }))
 }
 
-/// Indirect light where the camera sees diffuse faces, as exact as the picture needs it; `None` when
-/// it was stopped, or there is no light.
+/// Indirect light where the camera sees diffuse faces, as exact as the picture needs it; `None` when it was stopped, or
+/// no light is seen that an error could be relative to.
 pub(super) fn indirect_field(
     world: &World<'_>,
     lookup: &Lookup,
@@ -112,12 +112,16 @@ pub(super) fn indirect_field(
         .sqrt()
         .max(1.0);
     let cells = [width, height].map(|side| (side as f64 / every).ceil() as usize);
-    let seen = views(world, frame, cells);
+    let mut seen = views(world, frame, cells);
+    seen.retain(|vertex| vertex.reflectance().0.max_element() > 0.0);
     let share = seen.len() as f64 / (cells[0] * cells[1]) as f64;
     let weight = |vertex: &Vertex<'_>| vertex.reflectance().0 * (share.sqrt() / PI);
     let receivers: Vec<Receiver> = seen.iter().map(Vertex::receiver).collect();
     let weights: Vec<Rgb> = seen.iter().map(weight).collect();
     let level = Gatherer::new(world, lookup, config).level(&rays(frame, [GRID; 2]));
+    if level <= 0.0 {
+        return None;
+    }
     let seed = hash::mix64(config.seed ^ FIELD);
     FieldGather::new(world, lookup, &receivers, seed).until(error * level, &weights, steering)
 }
