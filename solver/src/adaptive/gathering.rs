@@ -95,7 +95,8 @@ impl<'a> Gathering<'a> {
         };
         let cost = round.gather_cost(self.receivers.len());
         let part = (self.receivers.len() / PARTS)
-            .max(RAYS_OF_PART / (round.rays + round.shadow_rays).max(1));
+            .max(RAYS_OF_PART / (round.rays + round.shadow_rays).max(1))
+            .max(1);
         let parts = self.receivers.len().div_ceil(part);
         let share = control.begin(stage, cost, parts);
         if share <= 0.0 {
