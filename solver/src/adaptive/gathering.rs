@@ -31,6 +31,35 @@ pub(super) fn gathers(receivers: usize) -> usize {
     }
 }
 
+/// Receivers of a part of a gather of so many rays at each.
+pub(super) fn receivers_of_part(receivers: usize, rays: usize) -> usize {
+    (receivers / PARTS).max(RAYS_OF_PART / rays.max(1)).max(1)
+}
+
+/// Gathers at all receivers, each an item of its own, `part` of them between two words of the control; `None`
+/// when that stops.
+pub(super) fn gather_in_parts(
+    world: &World,
+    lookup: Option<&Lookup>,
+    receivers: &[Receiver],
+    part: usize,
+    config: &GatherConfig,
+    control: &mut dyn Control,
+) -> Option<Vec<Tally>> {
+    let mut tallies = Vec::with_capacity(receivers.len());
+    for receivers in receivers.chunks(part) {
+        let first = tallies.len() as u64;
+        let keys: Vec<Key> = (first..first + receivers.len() as u64)
+            .map(Key::of)
+            .collect();
+        tallies.extend(gather(world, lookup, receivers, &keys, config));
+        if !control.advance() {
+            return None;
+        }
+    }
+    Some(tallies)
+}
+
 /// Receivers with what has been gathered at them.
 pub(super) struct Gathering<'a> {
     world: &'a World<'a>,
@@ -94,9 +123,7 @@ impl<'a> Gathering<'a> {
             },
         };
         let cost = round.gather_cost(self.receivers.len());
-        let part = (self.receivers.len() / PARTS)
-            .max(RAYS_OF_PART / (round.rays + round.shadow_rays).max(1))
-            .max(1);
+        let part = receivers_of_part(self.receivers.len(), round.rays + round.shadow_rays);
         let parts = self.receivers.len().div_ceil(part);
         let share = control.begin(stage, cost, parts);
         if share <= 0.0 {
@@ -113,17 +140,10 @@ impl<'a> Gathering<'a> {
             components: self.config.components,
             seed: self.config.seed,
         };
-        let mut tallies = Vec::with_capacity(self.receivers.len());
-        for receivers in self.receivers.chunks(part) {
-            let first = tallies.len() as u64;
-            let keys: Vec<Key> = (first..first + receivers.len() as u64)
-                .map(Key::of)
-                .collect();
-            tallies.extend(gather(self.world, lookup, receivers, &keys, &config));
-            if !control.advance() {
-                return false;
-            }
-        }
+        let gathered = gather_in_parts(self.world, lookup, self.receivers, part, &config, control);
+        let Some(tallies) = gathered else {
+            return false;
+        };
         for (tally, more) in self.tallies.iter_mut().zip(&tallies) {
             tally.join(more);
         }

@@ -4,10 +4,10 @@
 //! are added until it suits. The noise of n rays at each receiver falls as n^−0.4 where there are many, because cells
 //! shrink as it does, and as n^−1 where the first few show a shape. Gather rays are kept; their sequences go on.
 
+use super::gathering::{gather_in_parts, receivers_of_part};
 use super::{Control, Stage};
 use crate::gather::{
-    Components, GatherConfig, IndirectField, Key, Lookup, MAX_REPLICATES, SkyRays, Solutions,
-    Tally, gather,
+    Components, GatherConfig, IndirectField, Lookup, MAX_REPLICATES, SkyRays, Solutions, Tally,
 };
 use crate::world::{Receiver, World};
 use luxel_scenes::Rgb;
@@ -24,8 +24,7 @@ const EXPONENT: f64 = 0.6;
 /// The smallest and the largest growth of the rays in a round.
 const GROWTH: [f64; 2] = [1.5, 4.0];
 
-/// Receivers that are gathered between two words of the control, and at which noise is measured.
-const PART: usize = 1 << 14;
+/// Receivers at which noise is measured.
 const MEASURED: usize = 1 << 11;
 
 /// Receivers gathered so far.
@@ -95,7 +94,8 @@ impl<'a> FieldGather<'a> {
     fn add(&mut self, rays: usize, control: &mut dyn Control) -> bool {
         let all_rays = rays * MAX_REPLICATES;
         let cost = (all_rays * self.receivers.len()) as f64;
-        let parts = self.receivers.len().div_ceil(PART);
+        let part = receivers_of_part(self.receivers.len(), all_rays);
+        let parts = self.receivers.len().div_ceil(part);
         if control.begin(Stage::Gathering, cost, parts) < 1.0 {
             return false;
         }
@@ -109,23 +109,11 @@ impl<'a> FieldGather<'a> {
             components: Components::All,
             seed: self.seed,
         };
-        let mut found = Vec::with_capacity(self.receivers.len());
-        for receivers in self.receivers.chunks(PART) {
-            let first = found.len() as u64;
-            let keys: Vec<Key> = (first..first + receivers.len() as u64)
-                .map(Key::of)
-                .collect();
-            found.extend(gather(
-                self.world,
-                Some(self.lookup),
-                receivers,
-                &keys,
-                &config,
-            ));
-            if !control.advance() {
-                return false;
-            }
-        }
+        let (world, lookup) = (self.world, Some(self.lookup));
+        let gathered = gather_in_parts(world, lookup, self.receivers, part, &config, control);
+        let Some(found) = gathered else {
+            return false;
+        };
         for (tally, more) in self.tallies.iter_mut().zip(&found) {
             tally.join(more);
         }

@@ -199,6 +199,7 @@ mod tests {
             "the irradiance is {largest} times its weight"
         );
     }
+
     #[test]
     fn a_weight_is_finite_and_in_proportion_to_the_radiosity() {
         let Source::Polygon {
