@@ -39,8 +39,9 @@ const SHADOW_RAYS: usize = 4;
 const FINER: usize = 4;
 const MOST_PATCHES: usize = 1_000_000;
 
-/// Samples of a pixel that a refinement begins with.
-const FIRST_SAMPLES: u32 = 4;
+/// Samples of a pixel that a refinement begins with; where a field knows the indirect light, few show the rest.
+const FIRST_SAMPLES: u32 = 8;
+const FIRST_SAMPLES_OF_FIELD: u32 = 4;
 
 /// Rays for ambient occlusion of a camera sample.
 const AO_RAYS: u32 = 8;
@@ -296,7 +297,11 @@ impl Render {
     ) -> Option<Exposed> {
         let seed = context.common.seed;
         let fixed = self.spp.map(|spp| Samples::new(spp, seed));
-        let first = fixed.unwrap_or(Samples::new(FIRST_SAMPLES, seed));
+        let few = match self.integrator {
+            Method::Gather | Method::Whitted => FIRST_SAMPLES_OF_FIELD,
+            Method::Radiosity | Method::Path | Method::Ao => FIRST_SAMPLES,
+        };
+        let first = fixed.unwrap_or(Samples::new(few, seed));
         let mut film = Film::new(frame.size(), first.replicates);
         let mut steering = Steering::new(context, goal);
         let add = |film: &mut Film, further: &[u32], progress: &dyn Progress| {
