@@ -1,10 +1,11 @@
 //! A scene with what is looked up in it: solutions on meshes whose density follows the light.
 
-use super::budget::{self, JOINED_FROM};
+use super::budget::{self, JOINED_FROM, fewest_shadow_rays};
 use super::gathering::{Gathering, gathers};
+use super::penumbrae::Penumbrae;
 use super::{
-    AdaptiveConfig, Budget, Changes, Control, ROW_RAYS, SAFETY, Stage, WORTHWHILE, first_budget,
-    plan,
+    AdaptiveConfig, Budget, Changes, Control, ROW_RAYS, SAFETY, Spent, Stage, WORTHWHILE,
+    first_budget,
 };
 use crate::gather::{Lookup, MAX_REPLICATES, error_parts};
 use crate::patches::{Density, Patches};
@@ -120,14 +121,28 @@ impl<'w, 's> Adapted<'w, 's> {
                 return Ok(None);
             };
             let mut gathering = Gathering::new(self.world, &sample, gathers(count), config);
-            if !gathering.go_on(Some(&lookup), &pilot, Stage::Pilot, control) {
+            let evenly = gathering.evenly(pilot.shadow_rays);
+            if !gathering.go_on(Some(&lookup), pilot.rays, evenly, Stage::Pilot, control) {
                 return Ok(None);
             }
             let mut parts = error_parts(&gathering.tallies);
             if count >= JOINED_FROM {
                 parts.gather /= USUAL_GAIN;
             }
-            let planned = plan(self.world, &pilot, error, &parts, count, Changes::All);
+            let penumbrae = Penumbrae::even(
+                sample.len(),
+                pilot.shadow_rays,
+                fewest_shadow_rays(count),
+                parts.direct,
+            );
+            let has_sky = self.world.lights().has_sky();
+            let spent = Spent {
+                budget: pilot,
+                parts,
+                penumbrae,
+                has_sky,
+            };
+            let planned = spent.plan(error, count, Changes::All).budget;
             if planned.patches as f64 <= WORTHWHILE * pilot.patches as f64 {
                 let patches = pilot.patches;
                 return Ok(Some((lookup, Budget { patches, ..planned })));

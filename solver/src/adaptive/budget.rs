@@ -12,7 +12,8 @@
 //! Source: the allocation rule of stratified sampling (J. Neyman, "On the two different aspects of
 //! the representative method", 1934) with measured exponents in place of 1/2.
 
-use crate::gather::{ErrorParts, MAX_REPLICATES};
+use super::penumbrae::Penumbrae;
+use crate::gather::{ErrorParts, MAX_REPLICATES, SHADOW_EXPONENT};
 
 /// What is spent. Rays are over all replicates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -21,8 +22,15 @@ pub struct Budget {
     pub patches: usize,
     /// Gather rays of a receiver.
     pub rays: usize,
-    /// Shadow rays of a receiver.
+    /// Shadow rays of a receiver, the mean of all receivers.
     pub shadow_rays: usize,
+}
+
+/// A budget with the shadow rays of each class of receivers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Planned {
+    pub(super) budget: Budget,
+    pub(super) shadow_rays: Vec<usize>,
 }
 
 /// What of a budget may change.
@@ -32,8 +40,6 @@ pub enum Changes {
     All,
     /// Rays: those that were gathered in the mesh stay.
     Rays,
-    /// Gather rays alone: no shadow rays are cast anew.
-    GatherRays,
 }
 
 /// Rays of a patch's row in each solution. 64 measured no better per ray; 16 biases the near
@@ -42,12 +48,11 @@ pub const ROW_RAYS: usize = 32;
 
 /// Exponents with which errors fall, measured on the reference scenes: the noise of the solution and the
 /// stated error of the mesh with the number of patches (0.5; 0.7–1.1, where the error itself falls with
-/// 0.6), those of gather rays (0.62–0.73) and of shadow rays (0.6–0.75). Too large, and a second round
-/// adds what is missing; too small, and the first spends too much.
+/// 0.6), and that of gather rays (0.62–0.73). Too large, and a second round adds what is missing; too small, and the
+/// first spends too much.
 const SOLUTION_EXPONENT: f64 = 0.5;
 const MESH_EXPONENT: f64 = 0.9;
 const RAY_EXPONENT: f64 = 0.7;
-const SHADOW_EXPONENT: f64 = 0.7;
 
 /// Times in units of a gather ray with what follows it, measured on the reference scenes: a row's
 /// ray with its share of direct light (0.7–1.2), and a shadow ray (0.3–0.5). Only their rough ratio
@@ -106,27 +111,23 @@ impl Budget {
         }
     }
 
-    /// The cheapest budget for a relative error, from the errors that this one had.
-    #[must_use]
-    pub fn for_error(
+    /// The cheapest budget for a relative error, from the errors that this one had at the receivers of `penumbrae`.
+    /// There are `count` receivers of which those are a sample.
+    pub(super) fn for_error(
         self,
         error: f64,
         parts: &ErrorParts,
-        receivers: usize,
+        penumbrae: &Penumbrae,
+        count: usize,
         changes: Changes,
-    ) -> Self {
-        let fewest = fewest_rays(receivers);
+    ) -> Planned {
+        let fewest = fewest_rays(count);
         let patches = match changes {
             Changes::All => PATCHES,
-            Changes::Rays | Changes::GatherRays => [self.patches; 2],
+            Changes::Rays => [self.patches; 2],
         };
-        let shadow_rays = match changes {
-            Changes::All | Changes::Rays => [fewest.max(SHADOW_RAYS[0]), SHADOW_RAYS[1]],
-            Changes::GatherRays => [self.shadow_rays; 2],
-        };
-        let least_rays = least_rays(receivers);
-        let receivers = receivers as f64;
-        let items = [
+        let least_rays = least_rays(count);
+        let mut items = vec![
             Item {
                 spent: self.patches as f64,
                 parts: vec![
@@ -139,16 +140,20 @@ impl Budget {
             Item {
                 spent: self.rays as f64,
                 parts: vec![(parts.gather.powi(2), RAY_EXPONENT)],
-                cost: receivers,
+                cost: count as f64,
                 limits: [fewest.max(least_rays), RAYS[1]],
             },
-            Item {
-                spent: self.shadow_rays as f64,
-                parts: vec![(parts.direct.powi(2), SHADOW_EXPONENT)],
-                cost: receivers * SHADOW_RAY_COST,
-                limits: shadow_rays,
-            },
         ];
+        let sampled: usize = penumbrae.classes.iter().map(|class| class.receivers).sum();
+        items.extend(penumbrae.classes.iter().map(|class| {
+            let share = class.receivers as f64 / sampled as f64;
+            Item {
+                spent: class.rays.max(1) as f64,
+                parts: vec![(class.square, SHADOW_EXPONENT)],
+                cost: count as f64 * share * SHADOW_RAY_COST,
+                limits: [class.fewest.min(SHADOW_RAYS[1]), SHADOW_RAYS[1]],
+            }
+        }));
         let wanted = error * error;
         // Bisection over the price of squared error, in logarithms.
         let (mut low, mut high) = (-40.0_f64, 40.0_f64);
@@ -164,41 +169,31 @@ impl Budget {
                 low = middle;
             }
         }
-        let [patches, rays, shadow_rays] = items.map(|item| item.at_price(low.exp()).ceil());
-        Self {
-            patches: patches as usize,
-            rays: even(rays),
-            shadow_rays: even(shadow_rays),
+        let spending: Vec<f64> = items
+            .iter()
+            .map(|item| item.at_price(low.exp()).ceil())
+            .collect();
+        let shadow_rays: Vec<usize> = spending[2..].iter().map(|&rays| even(rays)).collect();
+        let all_shadow_rays: usize = penumbrae
+            .classes
+            .iter()
+            .zip(&shadow_rays)
+            .map(|(class, rays)| class.receivers * rays)
+            .sum();
+        Planned {
+            budget: Self {
+                patches: spending[0] as usize,
+                rays: even(spending[1]),
+                shadow_rays: all_shadow_rays.div_ceil(sampled.max(1)),
+            },
+            shadow_rays,
         }
     }
+}
 
-    /// Time of the rays of some receivers, in units of gather rays.
-    pub(super) fn gather_cost(&self, receivers: usize) -> f64 {
-        receivers as f64 * (self.rays as f64 + SHADOW_RAY_COST * self.shadow_rays as f64)
-    }
-
-    /// Rays that are to be cast after so many, for each receiver, in units of gather rays: shadow rays are cast
-    /// anew.
-    pub(super) fn further_cost(&self, spent: &Self) -> f64 {
-        let shadow_rays = if self.shadow_rays > spent.shadow_rays {
-            self.shadow_rays
-        } else {
-            0
-        };
-        let rays = self.rays.saturating_sub(spent.rays);
-        rays as f64 + SHADOW_RAY_COST * shadow_rays as f64
-    }
-
-    /// A share of the rays.
-    #[must_use]
-    pub(super) fn scaled(self, share: f64) -> Self {
-        let of = |rays: usize| even(rays as f64 * share.min(1.0));
-        Self {
-            rays: of(self.rays),
-            shadow_rays: of(self.shadow_rays),
-            ..self
-        }
-    }
+/// Time of so many gather and shadow rays, in units of gather rays.
+pub(super) fn gather_cost(rays: usize, shadow_rays: usize) -> f64 {
+    rays as f64 + SHADOW_RAY_COST * shadow_rays as f64
 }
 
 /// Time of solving with so many patches, in units of gather rays, the coarser mesh included.
@@ -218,6 +213,11 @@ pub(super) fn least_rays(receivers: usize) -> usize {
     } else {
         RAYS[0]
     }
+}
+
+/// Fewest shadow rays of each of so many receivers that a plan may have.
+pub(super) fn fewest_shadow_rays(receivers: usize) -> usize {
+    fewest_rays(receivers).max(SHADOW_RAYS[0])
 }
 
 /// Fewest rays of each of so many receivers.
@@ -290,6 +290,14 @@ mod tests {
         spread: 0.0,
     };
 
+    fn plan(error: f64, parts: &ErrorParts, receivers: usize, changes: Changes) -> Budget {
+        let fewest = fewest_shadow_rays(receivers);
+        let even = Penumbrae::even(receivers, SPENT.shadow_rays, fewest, parts.direct);
+        SPENT
+            .for_error(error, parts, &even, receivers, changes)
+            .budget
+    }
+
     fn predicted(budget: Budget) -> f64 {
         let fall = |from: usize, to: usize, b: f64| (from as f64 / to as f64).powf(2.0 * b);
         (PARTS.solution.powi(2) * fall(SPENT.patches, budget.patches, SOLUTION_EXPONENT)
@@ -302,7 +310,7 @@ mod tests {
     #[test]
     fn the_budget_meets_the_error_and_no_cheaper_one_does() {
         for error in [0.02, 0.01, 0.005, 0.001] {
-            let best = SPENT.for_error(error, &PARTS, 1000, Changes::All);
+            let best = plan(error, &PARTS, 1000, Changes::All);
             // Rounding up to whole rays gains less than a hundredth.
             assert!(
                 (0.99 * error..=error).contains(&predicted(best)),
@@ -310,7 +318,8 @@ mod tests {
                 predicted(best)
             );
             // What is taken from one part must be given to another: shift a tenth of the rays.
-            let cost = |b: &Budget| solve_cost(b.patches) + b.gather_cost(1000);
+            let cost =
+                |b: &Budget| solve_cost(b.patches) + 1000.0 * gather_cost(b.rays, b.shadow_rays);
             for (patches, rays) in [(0.9, None), (1.1, None)].map(|(p, r)| (p, r.unwrap_or(p))) {
                 let other = Budget {
                     patches: (best.patches as f64 / patches) as usize,
@@ -327,41 +336,25 @@ mod tests {
 
     #[test]
     fn a_mesh_that_is_kept_leaves_the_rest_to_rays() {
-        let kept = SPENT.for_error(0.01, &PARTS, 1000, Changes::Rays);
+        let kept = plan(0.01, &PARTS, 1000, Changes::Rays);
         assert_eq!(kept.patches, SPENT.patches);
         assert!((0.0099..=0.01).contains(&predicted(kept)), "{kept:?}");
-        let free = SPENT.for_error(0.01, &PARTS, 1000, Changes::All);
+        let free = plan(0.01, &PARTS, 1000, Changes::All);
         assert!(kept.rays > free.rays && free.patches > kept.patches);
-    }
-
-    #[test]
-    fn shadow_rays_that_are_kept_leave_the_rest_to_gather_rays() {
-        let both = SPENT.for_error(0.01, &PARTS, 1000, Changes::Rays);
-        let kept = SPENT.for_error(0.01, &PARTS, 1000, Changes::GatherRays);
-        assert_eq!(kept.shadow_rays, SPENT.shadow_rays);
-        assert!(kept.rays > both.rays);
-        let cost = |budget: Budget| budget.further_cost(&SPENT);
-        assert!(cost(SPENT).abs() < 1e-9);
-        assert!((cost(kept) - (kept.rays - SPENT.rays) as f64).abs() < 1e-9);
-        assert!(cost(both) > SHADOW_RAY_COST * both.shadow_rays as f64);
-        // What shadow rays leave is more than the error: no number of gather rays suffices, and any other
-        // budget is cheaper.
-        let beyond = SPENT.for_error(0.5 * PARTS.direct, &PARTS, 1000, Changes::GatherRays);
-        assert!(beyond.rays > 100 * kept.rays, "{beyond:?}");
     }
 
     #[test]
     fn parts_without_error_cost_the_least_possible() {
         let none = ErrorParts::default();
         for (receivers, rays) in [(4000, RAYS[0]), (10_000, JOINED_RAYS)] {
-            let least = SPENT.for_error(0.01, &none, receivers, Changes::All);
+            let least = plan(0.01, &none, receivers, Changes::All);
             assert_eq!(
                 (least.patches, least.rays, least.shadow_rays),
                 (PATCHES[0], rays, SHADOW_RAYS[0])
             );
         }
         // What cannot be reached is approached as far as it goes.
-        let most = SPENT.for_error(1e-9, &PARTS, 10, Changes::All);
+        let most = plan(1e-9, &PARTS, 10, Changes::All);
         assert_eq!(most.rays, RAYS[1]);
     }
 }

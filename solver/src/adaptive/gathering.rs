@@ -1,7 +1,8 @@
 //! Receivers with what has been gathered at them, round after round: gather rays are added to those that
-//! were cast, shadow rays are cast anew.
+//! were cast, shadow rays are cast anew where more are due.
 
-use super::budget::JOINED_FROM;
+use super::budget::{JOINED_FROM, even, gather_cost};
+use super::penumbrae::Penumbrae;
 use super::{Adaptive, AdaptiveConfig, Budget, Control, Ending, Stage};
 use crate::gather::{
     GatherConfig, Key, Lookup, MAX_REPLICATES, SkyRays, Solutions, Tally, error_parts, gather,
@@ -32,33 +33,52 @@ pub(super) fn gathers(receivers: usize) -> usize {
 }
 
 /// Receivers of a part of a gather of so many rays at each.
-pub(super) fn receivers_of_part(receivers: usize, rays: usize) -> usize {
+fn receivers_of_part(receivers: usize, rays: usize) -> usize {
     (receivers / PARTS).max(RAYS_OF_PART / rays.max(1)).max(1)
 }
 
-/// Gathers at all receivers, each an item of its own, `part` of them between two words of the control; `None`
-/// when that stops.
-pub(super) fn gather_in_parts(
+/// Gathers at some receivers, each an item of its own, and joins what that found to their tallies, part after part.
+/// False when `control` stops; some parts are then joined and some not.
+pub(super) fn add(
     world: &World,
     lookup: Option<&Lookup>,
     receivers: &[Receiver],
-    part: usize,
+    positions: &[u32],
     config: &GatherConfig,
+    tallies: &mut [Tally],
     control: &mut dyn Control,
-) -> Option<Vec<Tally>> {
-    let mut tallies = Vec::with_capacity(receivers.len());
-    for receivers in receivers.chunks(part) {
-        let first = tallies.len() as u64;
-        let keys: Vec<Key> = (first..first + receivers.len() as u64)
-            .map(Key::of)
-            .collect();
-        tallies.extend(gather(world, lookup, receivers, &keys, config));
+) -> bool {
+    let part = receivers_of_part(receivers.len(), config.rays + config.shadow_rays);
+    for positions in positions.chunks(part) {
+        let of_part = positions
+            .iter()
+            .map(|&position| receivers[position as usize]);
+        let of_part: Vec<Receiver> = of_part.collect();
+        let keys = positions.iter().map(|&position| Key::of(position.into()));
+        let keys: Vec<Key> = keys.collect();
+        let found = gather(world, lookup, &of_part, &keys, config);
+        for (&position, more) in positions.iter().zip(&found) {
+            tallies[position as usize].join(more);
+        }
         if !control.advance() {
-            return None;
+            return false;
         }
     }
-    Some(tallies)
+    true
 }
+
+/// Number of parts in which [`add`] gathers so many of all receivers, with so many rays each.
+pub(super) fn parts(some: usize, all: usize, rays: usize) -> usize {
+    some.div_ceil(receivers_of_part(all, rays))
+}
+
+/// The positions of so many receivers.
+pub(super) fn all(receivers: usize) -> Vec<u32> {
+    (0..receivers as u32).collect()
+}
+
+/// Receivers, by position, that get so many shadow rays.
+pub(super) type ShadowRound = (usize, Vec<u32>);
 
 /// Receivers with what has been gathered at them.
 pub(super) struct Gathering<'a> {
@@ -104,54 +124,96 @@ impl<'a> Gathering<'a> {
         }
     }
 
-    /// Gathers what is missing from what was spent to `budget`: gather rays are added, shadow rays
-    /// cast anew. False when `control` stops; the tallies are then as they were.
+    /// The same receivers with their direct light alone: what a new mesh leaves.
+    pub(super) fn with_direct_alone(mut self) -> Self {
+        for tally in &mut self.tallies {
+            *tally = tally.direct_alone();
+        }
+        self.spent.rays = 0;
+        self
+    }
+
+    /// Receivers by the noise of their direct light, which is a part `error` of the relative error of all. That of a
+    /// sky's is not known beforehand: all are alike.
+    pub(super) fn penumbrae(&self, error: f64, has_sky: bool) -> Penumbrae {
+        if has_sky {
+            let rays = self.spent.shadow_rays;
+            Penumbrae::even(self.receivers.len(), rays, rays, error)
+        } else {
+            Penumbrae::new(&self.tallies, error)
+        }
+    }
+
+    /// All receivers with the same number of shadow rays.
+    pub(super) fn evenly(&self, shadow_rays: usize) -> Vec<ShadowRound> {
+        vec![(shadow_rays, all(self.receivers.len()))]
+    }
+
+    /// Adds gather rays to those of all receivers up to `rays`, and casts shadow rays anew where they are due. False
+    /// when `control` stops; there is then no going on.
     pub(super) fn go_on(
         &mut self,
         lookup: Option<&Lookup>,
-        budget: &Budget,
+        rays: usize,
+        shadow_rounds: Vec<ShadowRound>,
         stage: Stage,
         control: &mut dyn Control,
     ) -> bool {
-        let round = Budget {
-            patches: budget.patches,
-            rays: budget.rays - self.spent.rays,
-            shadow_rays: if budget.shadow_rays == self.spent.shadow_rays {
-                0
-            } else {
-                budget.shadow_rays
-            },
-        };
-        let cost = round.gather_cost(self.receivers.len());
-        let part = receivers_of_part(self.receivers.len(), round.rays + round.shadow_rays);
-        let parts = self.receivers.len().div_ceil(part);
-        let share = control.begin(stage, cost, parts);
+        let further = rays - self.spent.rays;
+        let count = self.receivers.len();
+        let mut cost = count as f64 * gather_cost(further, 0);
+        let mut all_parts = parts(count, count, further);
+        for (rays, receivers) in &shadow_rounds {
+            cost += receivers.len() as f64 * gather_cost(0, *rays);
+            all_parts += parts(receivers.len(), count, *rays);
+        }
+        let share = control.begin(stage, cost, all_parts);
         if share <= 0.0 {
             return false;
         }
-        let round = round.scaled(share);
-        let config = GatherConfig {
-            rays: round.rays,
+        let scaled = |rays: usize| even(rays as f64 * share.min(1.0));
+        let of_rays = GatherConfig {
+            rays: scaled(further),
             rays_before: self.spent.rays / self.gathers,
-            shadow_rays: round.shadow_rays,
+            shadow_rays: 0,
             sky: SkyRays::Apart,
             gathers: self.gathers,
             solutions: Solutions::All,
             components: self.config.components,
             seed: self.config.seed,
         };
-        let gathered = gather_in_parts(self.world, lookup, self.receivers, part, &config, control);
-        let Some(tallies) = gathered else {
-            return false;
-        };
-        for (tally, more) in self.tallies.iter_mut().zip(&tallies) {
-            tally.join(more);
+        let mut goes_on = self.add(lookup, &all(count), &of_rays, control);
+        for (rays, mut receivers) in shadow_rounds {
+            let of_shadow_rays = GatherConfig {
+                rays: 0,
+                shadow_rays: scaled(rays),
+                ..of_rays
+            };
+            receivers.retain(|&r| self.tallies[r as usize].all_shadow_rays() < scaled(rays));
+            goes_on = goes_on && self.add(None, &receivers, &of_shadow_rays, control);
         }
-        self.spent = Budget {
-            patches: budget.patches,
-            rays: self.spent.rays + round.rays,
-            shadow_rays: self.spent.shadow_rays.max(round.shadow_rays),
-        };
-        true
+        let shadow_rays: usize = self.tallies.iter().map(Tally::all_shadow_rays).sum();
+        self.spent.rays += of_rays.rays;
+        self.spent.shadow_rays = shadow_rays.div_ceil(count.max(1));
+        goes_on
+    }
+
+    fn add(
+        &mut self,
+        lookup: Option<&Lookup>,
+        positions: &[u32],
+        config: &GatherConfig,
+        control: &mut dyn Control,
+    ) -> bool {
+        let (world, receivers) = (self.world, self.receivers);
+        add(
+            world,
+            lookup,
+            receivers,
+            positions,
+            config,
+            &mut self.tallies,
+            control,
+        )
     }
 }

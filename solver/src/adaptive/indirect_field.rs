@@ -4,7 +4,7 @@
 //! are added until it suits. The noise of n rays at each receiver falls as n^−0.4 where there are many, because cells
 //! shrink as it does, and as n^−1 where the first few show a shape. Gather rays are kept; their sequences go on.
 
-use super::gathering::{gather_in_parts, receivers_of_part};
+use super::gathering::{add, all, parts};
 use super::{Control, Stage};
 use crate::gather::{
     Components, GatherConfig, IndirectField, Lookup, MAX_REPLICATES, SkyRays, Solutions, Tally,
@@ -63,7 +63,7 @@ impl<'a> FieldGather<'a> {
     /// # Panics
     /// When there is not one weight for each receiver.
     pub fn until(
-        &mut self,
+        mut self,
         error: f64,
         weights: &[Rgb],
         control: &mut dyn Control,
@@ -90,13 +90,12 @@ impl<'a> FieldGather<'a> {
         field
     }
 
-    /// Adds rays to each gather of all receivers. False when `control` stops; all is then as it was.
+    /// Adds rays to each gather of all receivers. False when `control` stops; there is then no going on.
     fn add(&mut self, rays: usize, control: &mut dyn Control) -> bool {
         let all_rays = rays * MAX_REPLICATES;
         let cost = (all_rays * self.receivers.len()) as f64;
-        let part = receivers_of_part(self.receivers.len(), all_rays);
-        let parts = self.receivers.len().div_ceil(part);
-        if control.begin(Stage::Gathering, cost, parts) < 1.0 {
+        let count = self.receivers.len();
+        if control.begin(Stage::Gathering, cost, parts(count, count, all_rays)) < 1.0 {
             return false;
         }
         let config = GatherConfig {
@@ -109,15 +108,17 @@ impl<'a> FieldGather<'a> {
             components: Components::All,
             seed: self.seed,
         };
-        let (world, lookup) = (self.world, Some(self.lookup));
-        let gathered = gather_in_parts(world, lookup, self.receivers, part, &config, control);
-        let Some(found) = gathered else {
-            return false;
-        };
-        for (tally, more) in self.tallies.iter_mut().zip(&found) {
-            tally.join(more);
-        }
         self.rays += rays;
-        true
+        let (world, lookup) = (self.world, Some(self.lookup));
+        let (receivers, tallies) = (self.receivers, &mut self.tallies);
+        add(
+            world,
+            lookup,
+            receivers,
+            &all(count),
+            &config,
+            tallies,
+            control,
+        )
     }
 }

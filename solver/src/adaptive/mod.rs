@@ -21,6 +21,7 @@ mod adapted;
 mod budget;
 mod gathering;
 mod indirect_field;
+mod penumbrae;
 
 pub use adapted::Adapted;
 pub use budget::{Budget, Changes, ROW_RAYS, fewest_rays};
@@ -29,8 +30,9 @@ pub use indirect_field::FieldGather;
 use crate::gather::{Components, ErrorParts, Tally};
 use crate::pilot::PilotError;
 use crate::world::{Receiver, World};
-use budget::{JOINED_FROM, even, least_rays};
+use budget::{JOINED_FROM, Planned, even, least_rays};
 use gathering::{Gathering, gathers};
+use penumbrae::Penumbrae;
 
 /// How far below the error asked for the budget is planned from a pilot, which knows its parts to a tenth
 /// or two, and how far the upper estimate is planned below it from a gather at all receivers. Smaller, and
@@ -155,14 +157,19 @@ pub fn irradiance(
                 };
                 let first = even(share * planned.rays as f64).max(fewest);
                 let rays = first.min(planned.rays);
-                (lookup, budget) = (Some(solved), Budget { rays, ..planned });
+                lookup = Some(solved);
+                budget.patches = planned.patches;
+                budget.rays = rays;
             }
             None => return Ok(Adaptive::none()),
         }
     }
     let mut result = Adaptive::none();
+    let mut shadow_rounds = gathering.evenly(budget.shadow_rays);
     for _ in 0..MAX_ROUNDS {
-        if !gathering.go_on(lookup.as_ref(), &budget, Stage::Gathering, control) {
+        let (stage, rays) = (Stage::Gathering, budget.rays);
+        gathering.spent.patches = budget.patches;
+        if !gathering.go_on(lookup.as_ref(), rays, shadow_rounds, stage, control) {
             return Ok(result);
         }
         result = gathering.state(lookup.as_ref());
@@ -174,39 +181,40 @@ pub fn irradiance(
         error = config.error / MARGIN * (total / upper.max(f64::MIN_POSITIVE));
         // More is wanted than was planned for: half of what was reached.
         error = if total <= error { 0.5 * total } else { error };
-        let count = receivers.len();
-        let spent = gathering.spent;
-        let plan = |changes| plan(world, &spent, error, &result.parts, count, changes);
-        let mut next = plan(Changes::Rays);
-        if count >= JOINED_FROM {
-            next = cheaper(next, plan(Changes::GatherRays), &spent);
-        }
+        let (count, has_sky) = (receivers.len(), world.lights().has_sky());
+        let spent = Spent {
+            budget: gathering.spent,
+            parts: result.parts,
+            penumbrae: gathering.penumbrae(result.parts.direct, has_sky),
+            has_sky,
+        };
+        let mut next = spent.plan(error, count, Changes::Rays);
         // A new mesh begins a new gather: only where rays cannot make up for the old one.
         let fixed = result.parts.solution.hypot(result.parts.mesh);
         let mut solved = None;
         if let Some(scene) = adapted.as_ref().filter(|_| fixed > MESH_SHARE * error) {
-            let free = plan(Changes::All);
-            if free.patches > budget.patches {
+            let free = spent.plan(error, count, Changes::All);
+            if free.budget.patches > budget.patches {
                 let worthwhile = (WORTHWHILE * budget.patches as f64) as usize;
-                let patches = free.patches.max(worthwhile);
-                next = Budget { patches, ..free };
-                solved = scene.solve(patches, control)?;
+                next = free;
+                next.budget.patches = next.budget.patches.max(worthwhile);
+                solved = scene.solve(next.budget.patches, control)?;
             }
         }
-        next = Budget {
-            patches: next.patches,
-            rays: next.rays.clamp(spent.rays, RAY_GROWTH * spent.rays),
-            shadow_rays: next.shadow_rays.max(spent.shadow_rays),
+        let before = gathering.spent.rays;
+        budget = Budget {
+            rays: next.budget.rays.clamp(before, RAY_GROWTH * before),
+            ..next.budget
         };
-        if next == spent {
+        shadow_rounds = spent.penumbrae.due(&next.shadow_rays);
+        if budget.rays == before && solved.is_none() && shadow_rounds.is_empty() {
             result.ending = Ending::OutOfReach;
             return Ok(result);
         }
         if solved.is_some() {
             lookup = solved;
-            gathering = Gathering::new(world, receivers, gathers(receivers.len()), config);
+            gathering = gathering.with_direct_alone();
         }
-        budget = next;
     }
     result.ending = Ending::OutOfReach;
     Ok(result)
@@ -231,7 +239,15 @@ pub fn irradiance_for(
         }
     }
     let mut gathering = Gathering::new(world, receivers, gathers(receivers.len()), config);
-    if !gathering.go_on(lookup.as_ref(), budget, Stage::Gathering, control) {
+    gathering.spent.patches = budget.patches;
+    let evenly = gathering.evenly(budget.shadow_rays);
+    if !gathering.go_on(
+        lookup.as_ref(),
+        budget.rays,
+        evenly,
+        Stage::Gathering,
+        control,
+    ) {
         return Ok(Adaptive::none());
     }
     let mut result = gathering.state(lookup.as_ref());
@@ -254,16 +270,6 @@ impl Adaptive {
     }
 }
 
-/// Of two budgets the one that takes fewer rays after what was spent. Few receivers do without: shadow rays that
-/// are cast anew cost them little and leave room for what is not stated (furnished rooms).
-fn cheaper(one: Budget, other: Budget, spent: &Budget) -> Budget {
-    if other.further_cost(spent) < one.further_cost(spent) {
-        other
-    } else {
-        one
-    }
-}
-
 /// What to begin with at so many receivers.
 fn first_budget(world: &World, error: f64, receivers: usize) -> Budget {
     let budget = Budget::pilot(error);
@@ -280,21 +286,29 @@ fn first_budget(world: &World, error: f64, receivers: usize) -> Budget {
     }
 }
 
-/// The next budget for an error, after one that had certain parts.
-fn plan(
-    world: &World,
-    spent: &Budget,
-    error: f64,
-    parts: &ErrorParts,
-    receivers: usize,
-    changes: Changes,
-) -> Budget {
-    let mut planned = spent.for_error(error, parts, receivers, changes);
-    if world.lights().has_sky() {
-        let most = spent.shadow_rays * SKY_GROWTH;
-        planned.shadow_rays = planned.shadow_rays.clamp(FIRST_SKY_RAYS, most);
+/// What was spent, and the error that it left.
+struct Spent {
+    budget: Budget,
+    parts: ErrorParts,
+    penumbrae: Penumbrae,
+    has_sky: bool,
+}
+
+impl Spent {
+    /// The next budget for an error at `count` receivers.
+    fn plan(&self, error: f64, count: usize, changes: Changes) -> Planned {
+        let mut planned =
+            self.budget
+                .for_error(error, &self.parts, &self.penumbrae, count, changes);
+        if self.has_sky {
+            // All receivers are of one class.
+            let most = self.budget.shadow_rays * SKY_GROWTH;
+            let rays = planned.budget.shadow_rays.clamp(FIRST_SKY_RAYS, most);
+            planned.budget.shadow_rays = rays;
+            planned.shadow_rays = vec![rays];
+        }
+        planned
     }
-    planned
 }
 
 #[cfg(test)]

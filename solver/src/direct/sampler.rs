@@ -11,6 +11,7 @@
 
 use super::kernel::Scratch;
 use super::lights::{Lights, Source};
+use super::lit::{Lit, LitSum};
 use crate::bvh::{Bvh, Ray};
 use crate::geometry::ray_target;
 use crate::sampling::Sequence;
@@ -110,6 +111,36 @@ impl<'a> DirectSampler<'a> {
             "one irradiance for each sample"
         );
         irradiance.fill(Irradiance::ZERO);
+        self.cast_all(samples, shadow_rays);
+        for (index, group) in self.groups.iter().enumerate() {
+            let (visible, _) = self.visible(index);
+            if visible > 0.0 {
+                irradiance[group.sample as usize].0 += group.irradiance * visible;
+            }
+        }
+    }
+
+    /// The same with what is to be expected of its noise.
+    ///
+    /// # Panics
+    /// When `lit` is not as long as `samples`.
+    pub fn light(&mut self, samples: &[Sample], shadow_rays: ShadowRays, lit: &mut [Lit]) {
+        assert_eq!(samples.len(), lit.len(), "one result for each sample");
+        lit.fill(Lit::default());
+        self.cast_all(samples, shadow_rays);
+        let mut sum = LitSum::default();
+        for (index, group) in self.groups.iter().enumerate() {
+            let (visible, rays) = self.visible(index);
+            sum.add(group.irradiance, visible, rays);
+            let next = self.groups.get(index + 1);
+            if next.is_none_or(|next| next.sample != group.sample) {
+                lit[group.sample as usize] = std::mem::take(&mut sum).finish();
+            }
+        }
+    }
+
+    /// Casts the rays of all samples.
+    fn cast_all(&mut self, samples: &[Sample], shadow_rays: ShadowRays) {
         self.groups.clear();
         self.rays.clear();
         self.weights.clear();
@@ -133,26 +164,26 @@ impl<'a> DirectSampler<'a> {
         }
         self.blocked.resize(self.rays.len(), false);
         self.bvh.occluded(&self.rays, &mut self.blocked);
-        for (index, group) in self.groups.iter().enumerate() {
-            let first = group.first_ray as usize;
-            let end = self
-                .groups
-                .get(index + 1)
-                .map_or(self.rays.len(), |g| g.first_ray as usize);
-            let mut total = 0.0;
-            let mut visible = 0.0;
-            for ray in first..end {
-                total += self.weights[ray];
-                visible += if self.blocked[ray] {
-                    0.0
-                } else {
-                    self.weights[ray]
-                };
-            }
-            if visible > 0.0 {
-                irradiance[group.sample as usize].0 += group.irradiance * (visible / total);
-            }
+    }
+
+    /// The share of a group's light that its rays let through, and how many they are.
+    fn visible(&self, group: usize) -> (f64, usize) {
+        let first = self.groups[group].first_ray as usize;
+        let end = self
+            .groups
+            .get(group + 1)
+            .map_or(self.rays.len(), |next| next.first_ray as usize);
+        let mut total = 0.0;
+        let mut visible = 0.0;
+        for (weight, &blocked) in self.weights[first..end]
+            .iter()
+            .zip(&self.blocked[first..end])
+        {
+            total += weight;
+            visible += if blocked { 0.0 } else { *weight };
         }
+        let share = if visible > 0.0 { visible / total } else { 0.0 };
+        (share, end - first)
     }
 
     /// Collects what each light contributes at a point; returns the sum of weights.

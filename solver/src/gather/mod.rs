@@ -26,12 +26,12 @@ mod tally;
 pub use error_parts::{ErrorParts, error_parts};
 pub use joined::{IndirectField, joined};
 pub use lookup::{Lookup, MAX_REPLICATES, Solutions};
+pub(crate) use tally::SHADOW_EXPONENT;
 pub use tally::{Gathered, Tally, finish};
 
-use crate::direct::{DirectSampler, Dome, DomeRays, Sample, ShadowRays};
+use crate::direct::{DirectSampler, Dome, DomeRays, Lit, Sample, ShadowRays};
 use crate::sampling::{Sequence, Stage, hash};
 use crate::world::{Receiver, World};
-use luxel_scenes::Irradiance;
 use near_chain::Chains;
 use rayon::prelude::*;
 
@@ -143,6 +143,11 @@ pub fn gather(
             let empty = Tally {
                 gathers: config.gathers as u8,
                 solutions: solutions as u8,
+                shadow_rays: if wants_direct {
+                    share(config.shadow_rays, config.gathers)
+                } else {
+                    0
+                },
                 rays: if follows {
                     share(config.rays, config.gathers)
                 } else {
@@ -161,8 +166,9 @@ pub fn gather(
                 if wants_direct && config.shadow_rays > 0 {
                     let rays = share(config.shadow_rays, config.gathers) as usize;
                     let found = shadowed(&mut direct, receivers, keys, seed, rays);
-                    for (tally, direct) in tallies.iter_mut().zip(found) {
-                        tally.direct[gather] += direct.0;
+                    for (tally, lit) in tallies.iter_mut().zip(found) {
+                        tally.direct[gather] += lit.irradiance.0;
+                        tally.direct_variance += lit.variance / (config.gathers.pow(2) as f64);
                     }
                 }
                 if follows {
@@ -175,6 +181,11 @@ pub fn gather(
                         }
                         found.add_indirect_to(tally, gather, solutions);
                     });
+                }
+            }
+            if sky_is_apart {
+                for tally in &mut tallies {
+                    tally.expect_noise_as_light();
                 }
             }
             tallies
@@ -219,14 +230,14 @@ fn add_sky(
     }
 }
 
-/// Direct irradiance from shadow rays.
+/// Direct light from shadow rays.
 fn shadowed(
     sampler: &mut DirectSampler,
     receivers: &[Receiver],
     keys: &[Key],
     seed: u64,
     rays: usize,
-) -> Vec<Irradiance> {
+) -> Vec<Lit> {
     let samples: Vec<Sample> = receivers
         .iter()
         .zip(keys)
@@ -238,9 +249,9 @@ fn shadowed(
             index: key.index,
         })
         .collect();
-    let mut irradiance = vec![Irradiance::ZERO; samples.len()];
-    sampler.irradiance(&samples, ShadowRays::About(rays), &mut irradiance);
-    irradiance
+    let mut lit = vec![Lit::default(); samples.len()];
+    sampler.light(&samples, ShadowRays::About(rays), &mut lit);
+    lit
 }
 
 #[cfg(test)]

@@ -19,11 +19,18 @@ use super::lookup::{MAX_REPLICATES, PerSolution};
 use crate::error::{discretisation, moderate};
 use luxel_scenes::{Irradiance, Rgb};
 
+/// Exponent with which the noise of direct light falls with its shadow rays, measured on the reference scenes
+/// (0.6–0.75).
+pub(crate) const SHADOW_EXPONENT: f64 = 0.7;
+
 /// Sums over the rays of a receiver. Tallies of the same receiver from different rays can be joined.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Tally {
     /// Direct irradiance by gather: from shadow rays, a mean.
     pub(super) direct: [Rgb; MAX_REPLICATES],
+    /// What the variance of the mean of these is expected to be, but for a factor that is the same at all receivers
+    /// with as many shadow rays, in W²/m⁴ ([`crate::direct::Lit`]).
+    pub(super) direct_variance: Rgb,
     /// Direct light that gather rays found, a sum over rays by gather.
     pub(super) found: [Rgb; MAX_REPLICATES],
     /// Indirect light, a sum over rays by gather; the mean over solutions.
@@ -36,6 +43,8 @@ pub struct Tally {
     pub(super) squares: Rgb,
     /// Rays of each gather.
     pub(super) rays: u32,
+    /// Shadow rays of each gather.
+    pub(super) shadow_rays: u32,
     /// Rays that met the back of a one-sided face.
     pub(super) backs: u32,
     /// Independent gathers.
@@ -110,8 +119,10 @@ impl Tally {
             );
             self.solutions = other.solutions;
         }
-        if other.direct.iter().any(|&direct| direct != Rgb::ZERO) {
+        if other.shadow_rays > 0 {
             self.direct = other.direct;
+            self.direct_variance = other.direct_variance;
+            self.shadow_rays = other.shadow_rays;
         }
         for r in 0..MAX_REPLICATES {
             self.found[r] += other.found[r];
@@ -122,6 +133,39 @@ impl Tally {
         self.squares += other.squares;
         self.rays += other.rays;
         self.backs += other.backs;
+    }
+
+    /// Notes that the noise of direct light is expected to be in proportion to that light where there is any: of
+    /// rays for the sky no more is known. Without any scatter a receiver sees each light wholly or not at all.
+    pub(super) fn expect_noise_as_light(&mut self) {
+        let used = &self.direct[..usize::from(self.gathers)];
+        let scatters = used.iter().any(|direct| *direct != used[0]);
+        let mean = used.iter().sum::<Rgb>() / used.len() as f64;
+        self.direct_variance = if scatters { mean * mean } else { Rgb::ZERO };
+    }
+
+    /// Shadow rays of all gathers.
+    pub(crate) fn all_shadow_rays(&self) -> usize {
+        self.shadow_rays as usize * usize::from(self.gathers)
+    }
+
+    /// What does not depend on a mesh: the direct light that shadow rays found.
+    #[must_use]
+    pub(crate) fn direct_alone(&self) -> Self {
+        Self {
+            direct: self.direct,
+            direct_variance: self.direct_variance,
+            shadow_rays: self.shadow_rays,
+            gathers: self.gathers,
+            ..Self::default()
+        }
+    }
+
+    /// Expected variance of direct light, but for a factor that is the same at all receivers: even samples lessen
+    /// it faster than one over their number.
+    pub(crate) fn expected_direct_variance(&self) -> Rgb {
+        let shadow_rays = f64::from(self.shadow_rays.max(1));
+        self.direct_variance * shadow_rays.powf(1.0 - 2.0 * SHADOW_EXPONENT)
     }
 
     /// Direct and indirect irradiance in W/m².
@@ -196,18 +240,7 @@ impl Scatters {
             gathers,
             solutions,
             direct: by(&|tally, _| scatter(&tally.direct, gathers, channel)),
-            // Without any scatter a receiver sees each light wholly or not at all: it is not of
-            // those in half shadow, and does not tell about them.
-            direct_level: by(&|tally, gathered| {
-                let scatters = tally.direct[..usize::from(gathers)]
-                    .iter()
-                    .any(|direct| *direct != tally.direct[0]);
-                if scatters {
-                    gathered.direct.0[channel].powi(2)
-                } else {
-                    0.0
-                }
-            }),
+            direct_level: by(&|tally, _| tally.expected_direct_variance()[channel]),
             gather: by(&|tally, _| {
                 let sums: [Rgb; MAX_REPLICATES] =
                     std::array::from_fn(|g| tally.found[g] + tally.indirect[g]);
