@@ -54,11 +54,11 @@ impl<'a> Tree<'a> {
     /// would be mispredicted half of the time.
     #[inline]
     pub(super) fn prefetch(&self, child: Child) {
-        const SIZES: [usize; 2] = [size_of::<Node>(), size_of::<Block>()];
         const LINE: usize = 64;
+        const { assert!(size_of::<Node>() == size_of::<Block>()) };
         let bases: [*const u8; 2] = [self.nodes.cast(), self.blocks.cast()];
         let kind = usize::from(child.is_block());
-        let address = bases[kind].wrapping_add(child.index() * SIZES[kind]);
+        let address = bases[kind].wrapping_add(child.index() * size_of::<Node>());
         for line in 0..size_of::<Node>() / LINE {
             let address = address.wrapping_add(line * LINE).cast();
             // SAFETY: a prefetch has no effect but on the cache and never faults.
@@ -150,32 +150,31 @@ pub(super) fn load_axes(axes: &[u32; 4]) -> __m128i {
     unsafe { _mm_loadu_si128(axes.as_ptr().cast()) }
 }
 
-/// The memory of the stacks of several rays.
-pub(super) struct StackMemory {
+/// The memory of the stacks of `N` rays.
+pub(super) struct StackMemory<const N: usize> {
     children: Vec<Child>,
     keys: Vec<i32>,
     capacity: usize,
 }
 
-impl StackMemory {
-    /// `count` stacks for the paths through `wide`. On a path each node leaves at most seven
-    /// children behind; one entry lies at the bottom, and up to sixteen are read at a time.
-    pub(super) fn new(wide: &Wide, count: usize) -> Self {
-        let capacity = 1 + (WIDTH - 1) * wide.depth + 2 * WIDTH;
+impl<const N: usize> StackMemory<N> {
+    /// Stacks for the paths through `wide`. On a path each node leaves at most seven children
+    /// behind; one entry lies at the bottom, and eight are read and written at a time.
+    pub(super) fn new(wide: &Wide) -> Self {
+        let capacity = 1 + (WIDTH - 1) * wide.depth + WIDTH;
         Self {
-            children: vec![Child::NOTHING; capacity * count],
-            keys: vec![0; capacity * count],
+            children: vec![Child::NOTHING; capacity * N],
+            keys: vec![0; capacity * N],
             capacity,
         }
     }
 
     /// The stacks, each with [`Child::NOTHING`] at the bottom.
-    pub(super) fn stacks(&mut self) -> impl Iterator<Item = Stack<'_>> {
+    pub(super) fn stacks(&mut self) -> [Stack<'_>; N] {
         let (children, keys) = (self.children.as_mut_ptr(), self.keys.as_mut_ptr());
-        let starts = (0..self.children.len()).step_by(self.capacity);
-        starts.map(move |start| Stack {
-            children: children.wrapping_add(start),
-            keys: keys.wrapping_add(start),
+        std::array::from_fn(|index| Stack {
+            children: children.wrapping_add(index * self.capacity),
+            keys: keys.wrapping_add(index * self.capacity),
             lifetime: PhantomData,
         })
     }
@@ -187,7 +186,7 @@ impl StackMemory {
 pub(super) struct Stack<'a> {
     children: *mut Child,
     keys: *mut i32,
-    lifetime: PhantomData<&'a mut StackMemory>,
+    lifetime: PhantomData<&'a mut [Child]>,
 }
 
 impl Stack<'_> {
