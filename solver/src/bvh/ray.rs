@@ -6,6 +6,7 @@ use glam::Vec3;
 
 /// A ray in the unit frame. Only hits with `tmin` ≤ t < `tmax` count.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Ray {
     /// Origin, within about twice the bounds of the scene.
     pub origin: Vec3,

@@ -2,6 +2,7 @@
 
 use crate::bvh::collapse::Wide;
 use crate::bvh::node::{BLOCK, Block, Child, Node, WIDTH};
+use crate::bvh::ray::Ray;
 use std::arch::x86_64::*;
 use std::marker::PhantomData;
 
@@ -148,6 +149,38 @@ pub(super) fn store_u32(target: &mut [u32; 4], lanes: __m128i) {
 pub(super) fn load_axes(axes: &[u32; 4]) -> __m128i {
     // SAFETY: an unaligned load of four numbers from an array of four.
     unsafe { _mm_loadu_si128(axes.as_ptr().cast()) }
+}
+
+/// The components of a ray: origin, tmin, direction, tmax.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn load_ray(ray: &Ray) -> __m256 {
+    const { assert!(size_of::<Ray>() == size_of::<__m256>()) };
+    // SAFETY: an unaligned load of all of a ray, which is eight floats in the order of declaration
+    // without padding (`repr(C)`).
+    unsafe { _mm256_loadu_ps(std::ptr::from_ref(ray).cast()) }
+}
+
+/// Writes eight numbers to the begin of a slice.
+///
+/// # Panics
+/// When the slice is shorter.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn store_eight(target: &mut [u32], lanes: __m256i) {
+    let target = &mut target[..WIDTH];
+    // SAFETY: an unaligned store of eight numbers into as many.
+    unsafe { _mm256_storeu_si256(target.as_mut_ptr().cast(), lanes) }
+}
+
+/// Eight lanes as an array.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn lanes(v: __m256) -> [f32; WIDTH] {
+    let mut lanes = [0.0; WIDTH];
+    // SAFETY: an unaligned store of eight floats into an array of eight.
+    unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), v) };
+    lanes
 }
 
 /// The memory of the stacks of `N` rays.
