@@ -20,6 +20,11 @@ const BLOCK_COST: f32 = 1.0;
 /// Level of wide nodes where the tree is cut for work in parallel. The result does not depend on it.
 const CUT: usize = 3;
 
+/// Triangles up to which a ray is tested against all of them, and no box is looked at. Measured against
+/// the tree: with 12 triangles 2.7 to 4.6 times as fast, with 38 1.1 (shadow rays) to 2.1 times. With more
+/// the tree wins, first for shadow rays; with less, rooms of boxes lose what this gains.
+pub(super) const FEW: usize = 48;
+
 /// The wide tree.
 pub(super) struct Wide {
     pub(super) nodes: Vec<Node>,
@@ -98,6 +103,11 @@ impl Wide {
             depth: 1,
             leaf_order: Vec::new(),
         }
+    }
+
+    /// Whether there are so few triangles that the tree does not pay.
+    pub(super) fn is_few(&self) -> bool {
+        self.leaf_order.len() <= FEW
     }
 
     /// That every reference to a child names a node or a block. What follows references without a

@@ -9,6 +9,8 @@
 //! a box around it, and boxes are passed over only when they are entered beyond the nearest hit.
 //! So the nearest hit, and of those at the same distance the one of lowest id, is found in any
 //! order, and every kernel gives the same bits.
+//!
+//! Where there are few triangles a ray is tested against all of them, and there are no boxes.
 
 use super::collapse::Wide;
 use super::node::{Child, WIDTH};
@@ -43,11 +45,17 @@ fn stack_for(wide: &Wide) -> Stack {
 /// The nearest hit with tmin ≤ t < tmax. Of hits at the same distance the triangle of lowest id
 /// counts, so that the answer does not depend on the tree.
 fn closest(wide: &Wide, ray: &Ray, stack: &mut Stack) -> Hit {
-    let slabs = Slabs::new(ray);
     let shear = Shear::new(ray);
     // Hits at t = tmax do not count: the test keeps ties at the largest float below.
     let mut nearest = ray.tmax.next_down();
     let mut best = Hit::MISS;
+    if wide.is_few() {
+        for block in &wide.blocks {
+            triangle::nearest(block, &shear, everywhere(ray), &mut nearest, &mut best);
+        }
+        return best;
+    }
+    let slabs = Slabs::new(ray);
     stack.clear();
     stack.push((Child::ROOT, 0.0));
     while let Some((child, entry)) = stack.pop() {
@@ -78,11 +86,22 @@ fn closest(wide: &Wide, ray: &Ray, stack: &mut Stack) -> Hit {
     best
 }
 
+/// Limits of a test without a box: what is nearest, and where the box is entered.
+fn everywhere(ray: &Ray) -> [f32; 2] {
+    [ray.tmin, ray.tmin + 0.0]
+}
+
 /// True when anything is hit with tmin ≤ t < tmax; stops at the first such hit.
 fn any(wide: &Wide, ray: &Ray, stack: &mut Stack) -> bool {
-    let slabs = Slabs::new(ray);
     let shear = Shear::new(ray);
     let farthest = ray.tmax.next_down();
+    if wide.is_few() {
+        return wide.blocks.iter().any(|block| {
+            let (mut nearest, mut hit) = (farthest, Hit::MISS);
+            triangle::nearest(block, &shear, everywhere(ray), &mut nearest, &mut hit)
+        });
+    }
+    let slabs = Slabs::new(ray);
     stack.clear();
     stack.push((Child::ROOT, 0.0));
     while let Some((child, entry)) = stack.pop() {

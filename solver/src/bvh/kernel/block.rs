@@ -18,10 +18,10 @@ pub(super) struct LeafHit<'a> {
 }
 
 impl LeafHit<'_> {
-    /// Intersects a block; true when there is a hit that counts.
+    /// Intersects a block; true when there is a hit that counts. `ray` is asked for in rare cases.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    pub(super) fn update(&mut self, block: &Block, setup: &Setup, ray: &Ray) -> bool {
+    pub(super) fn update(&mut self, block: &Block, setup: &Setup, ray: impl Fn() -> Ray) -> bool {
         let edges = edges(block, setup);
         let inside = edges.inside();
         if _mm_movemask_ps(inside) == 0 {
@@ -29,8 +29,9 @@ impl LeafHit<'_> {
         }
         let limits = [self.entry, *self.nearest];
         let Some(points) = points(block, setup, &edges, inside, limits) else {
-            let shear = Shear::new(ray);
+            let ray = ray();
             let limits = [ray.tmin, self.entry];
+            let shear = Shear::new(&ray);
             return triangle::nearest(block, &shear, limits, self.nearest, self.best);
         };
         let mut lanes = points.lanes;

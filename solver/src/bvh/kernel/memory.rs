@@ -2,6 +2,7 @@
 
 use crate::bvh::collapse::Wide;
 use crate::bvh::node::{BLOCK, Block, Child, Node, WIDTH};
+use crate::bvh::ray::Ray;
 use std::arch::x86_64::*;
 use std::marker::PhantomData;
 
@@ -54,11 +55,11 @@ impl<'a> Tree<'a> {
     /// would be mispredicted half of the time.
     #[inline]
     pub(super) fn prefetch(&self, child: Child) {
-        const SIZES: [usize; 2] = [size_of::<Node>(), size_of::<Block>()];
         const LINE: usize = 64;
+        const { assert!(size_of::<Node>() == size_of::<Block>()) };
         let bases: [*const u8; 2] = [self.nodes.cast(), self.blocks.cast()];
         let kind = usize::from(child.is_block());
-        let address = bases[kind].wrapping_add(child.index() * SIZES[kind]);
+        let address = bases[kind].wrapping_add(child.index() * size_of::<Node>());
         for line in 0..size_of::<Node>() / LINE {
             let address = address.wrapping_add(line * LINE).cast();
             // SAFETY: a prefetch has no effect but on the cache and never faults.
@@ -150,32 +151,63 @@ pub(super) fn load_axes(axes: &[u32; 4]) -> __m128i {
     unsafe { _mm_loadu_si128(axes.as_ptr().cast()) }
 }
 
-/// The memory of the stacks of several rays.
-pub(super) struct StackMemory {
+/// The components of a ray: origin, tmin, direction, tmax.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn load_ray(ray: &Ray) -> __m256 {
+    const { assert!(size_of::<Ray>() == size_of::<__m256>()) };
+    // SAFETY: an unaligned load of all of a ray, which is eight floats in the order of declaration
+    // without padding (`repr(C)`).
+    unsafe { _mm256_loadu_ps(std::ptr::from_ref(ray).cast()) }
+}
+
+/// Writes eight numbers to the begin of a slice.
+///
+/// # Panics
+/// When the slice is shorter.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn store_eight(target: &mut [u32], lanes: __m256i) {
+    let target = &mut target[..WIDTH];
+    // SAFETY: an unaligned store of eight numbers into as many.
+    unsafe { _mm256_storeu_si256(target.as_mut_ptr().cast(), lanes) }
+}
+
+/// Eight lanes as an array.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn lanes(v: __m256) -> [f32; WIDTH] {
+    let mut lanes = [0.0; WIDTH];
+    // SAFETY: an unaligned store of eight floats into an array of eight.
+    unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), v) };
+    lanes
+}
+
+/// The memory of the stacks of `N` rays.
+pub(super) struct StackMemory<const N: usize> {
     children: Vec<Child>,
     keys: Vec<i32>,
     capacity: usize,
 }
 
-impl StackMemory {
-    /// `count` stacks for the paths through `wide`. On a path each node leaves at most seven
-    /// children behind; one entry lies at the bottom, and up to sixteen are read at a time.
-    pub(super) fn new(wide: &Wide, count: usize) -> Self {
-        let capacity = 1 + (WIDTH - 1) * wide.depth + 2 * WIDTH;
+impl<const N: usize> StackMemory<N> {
+    /// Stacks for the paths through `wide`. On a path each node leaves at most seven children
+    /// behind; one entry lies at the bottom, and eight are read and written at a time.
+    pub(super) fn new(wide: &Wide) -> Self {
+        let capacity = 1 + (WIDTH - 1) * wide.depth + WIDTH;
         Self {
-            children: vec![Child::NOTHING; capacity * count],
-            keys: vec![0; capacity * count],
+            children: vec![Child::NOTHING; capacity * N],
+            keys: vec![0; capacity * N],
             capacity,
         }
     }
 
     /// The stacks, each with [`Child::NOTHING`] at the bottom.
-    pub(super) fn stacks(&mut self) -> impl Iterator<Item = Stack<'_>> {
+    pub(super) fn stacks(&mut self) -> [Stack<'_>; N] {
         let (children, keys) = (self.children.as_mut_ptr(), self.keys.as_mut_ptr());
-        let starts = (0..self.children.len()).step_by(self.capacity);
-        starts.map(move |start| Stack {
-            children: children.wrapping_add(start),
-            keys: keys.wrapping_add(start),
+        std::array::from_fn(|index| Stack {
+            children: children.wrapping_add(index * self.capacity),
+            keys: keys.wrapping_add(index * self.capacity),
             lifetime: PhantomData,
         })
     }
@@ -187,7 +219,7 @@ impl StackMemory {
 pub(super) struct Stack<'a> {
     children: *mut Child,
     keys: *mut i32,
-    lifetime: PhantomData<&'a mut StackMemory>,
+    lifetime: PhantomData<&'a mut [Child]>,
 }
 
 impl Stack<'_> {

@@ -7,20 +7,23 @@ use crate::bvh::slabs::{LEAST_COMPONENT, RECIPROCAL_OF_LESS};
 use std::arch::x86_64::*;
 
 /// A ray for the node step and the leaf step. Of all arrays the fourth component is unused.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 #[repr(C, align(32))]
 pub(super) struct Setup {
     /// Origin and direction in f64.
     pub(super) exact_origin: [f64; 4],
     pub(super) exact_direction: [f64; 4],
     pub(super) origin: [f32; 4],
-    pub(super) reciprocal: [f32; 4],
+    /// The reciprocals of the direction's components, negated: (o − p) · −1/d is (p − o) · 1/d to the bit,
+    /// and the processor subtracts from a register what it reads.
+    pub(super) minus_reciprocal: [f32; 4],
     /// Origin in the sheared order of axes.
     pub(super) shear_origin: [f32; 4],
     /// The shear of x and of y.
     pub(super) scale: [f32; 4],
-    /// Byte offsets of the planes that the ray enters through.
+    /// Byte offsets of the planes that the ray enters through, and of those that it leaves through.
     pub(super) near: [u32; 4],
+    pub(super) far: [u32; 4],
     /// The sheared order of axes, each below 3.
     pub(super) axes: [u32; 4],
     /// Nearest distance that counts, not −0.
@@ -77,19 +80,22 @@ impl Setup {
             exact_origin: [0.0; 4],
             exact_direction: [0.0; 4],
             origin: [ox, oy, oz, 0.0],
-            reciprocal: [0.0; 4],
+            minus_reciprocal: [0.0; 4],
             shear_origin: [0.0; 4],
             scale: [0.0; 4],
             near: [0; 4],
+            far: [0; 4],
             axes: *axes,
             tmin: ray.tmin + 0.0,
         };
         memory::store_f64(&mut setup.exact_origin, _mm256_cvtps_pd(origin));
         memory::store_f64(&mut setup.exact_direction, _mm256_cvtps_pd(direction));
-        memory::store(&mut setup.reciprocal, reciprocal);
+        memory::store(&mut setup.minus_reciprocal, _mm_xor_ps(sign, reciprocal));
         memory::store(&mut setup.shear_origin, shear_origin);
         memory::store(&mut setup.scale, scale);
         memory::store_u32(&mut setup.near, near);
+        // The two planes of an axis differ in one bit.
+        memory::store_u32(&mut setup.far, _mm_xor_si128(near, _mm_set1_epi32(plane)));
         setup
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! On a processor without the kernel both sides are the twin, and the tests say nothing.
 
+use super::super::collapse::FEW;
 use super::super::{Bvh, Hit, Ray};
 use super::{random, random_direction, random_point, room, scene_of, soup};
 use crate::geometry::{Geometry, TriangleId};
@@ -22,9 +23,9 @@ fn slivers(count: u64) -> Scene {
 }
 
 /// The same triangle many times, and a fan of triangles that lie in one plane and overlap.
-fn coincident() -> Scene {
-    let mut triangles = vec![[DVec3::ZERO, DVec3::X, DVec3::Y]; 40];
-    for i in 0..40 {
+fn coincident(count: u8) -> Scene {
+    let mut triangles = vec![[DVec3::ZERO, DVec3::X, DVec3::Y]; usize::from(count)];
+    for i in 0..count {
         let angle = 0.1 * f64::from(i);
         let tip = DVec3::new(angle.cos(), angle.sin(), 0.0);
         triangles.push([DVec3::ZERO, tip, DVec3::new(-tip.y, tip.x, 0.0)]);
@@ -60,7 +61,12 @@ fn scenes() -> Vec<(&'static str, Scene)> {
         ),
         ("turned room", room(if cfg!(miri) { 2 } else { 16 }, 0.7)),
         ("slivers", slivers(if cfg!(miri) { 20 } else { 500 })),
-        ("coincident", coincident()),
+        ("coincident", coincident(40)),
+        // On either side of the number from which there is a tree.
+        ("few", soup(FEW as u64)),
+        ("not few", soup(FEW as u64 + 1)),
+        ("few slivers", slivers(20)),
+        ("few coincident", coincident(20)),
         ("cascade", cascade()),
     ]
 }
