@@ -5,6 +5,7 @@ use crate::id::{FaceId, MaterialId, ObjectId};
 use crate::light::Light;
 use crate::material::{Material, Texture};
 use glam::{DVec2, DVec3, Vec2, Vec3};
+use rayon::prelude::*;
 
 /// What the numbers of lights and emission are counted in; results come out in the same system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -55,6 +56,27 @@ pub struct Corners {
     pub uv0: Vec<Vec2>,
     /// Second UV set (lightmaps), v upwards, or empty.
     pub uv1: Vec<Vec2>,
+}
+
+impl Corners {
+    /// Appends other corners; attributes that only one side has are zero on the other.
+    pub(crate) fn append(&mut self, other: Self) {
+        let (before, added) = (self.vertex.len(), other.vertex.len());
+        append(&mut self.normal, &other.normal, before, added);
+        append(&mut self.uv0, &other.uv0, before, added);
+        append(&mut self.uv1, &other.uv1, before, added);
+        self.vertex.extend(other.vertex);
+    }
+}
+
+/// Appends an attribute that either side may not have; what is missing is zero.
+fn append<T: Copy + Default>(to: &mut Vec<T>, from: &[T], before: usize, added: usize) {
+    if to.is_empty() && from.is_empty() {
+        return;
+    }
+    to.resize(before, T::default());
+    to.extend_from_slice(from);
+    to.resize(before + added, T::default());
 }
 
 /// A whole scene in world space, metres, right-handed.
@@ -135,13 +157,22 @@ impl Scene {
     /// Lower and upper corner of the box around all vertices that faces use, in metres; `None`
     /// without faces.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        self.corners
+        /// Corners that are joined at a time: the same at any number of threads, because of two zeros of
+        /// different sign the first is the minimum.
+        const CHUNK: usize = 1 << 16;
+        type Bounds = (DVec3, DVec3);
+        let join = |a: Bounds, b: Bounds| (a.0.min(b.0), a.1.max(b.1));
+        let of_chunk = |corners: &[u32]| -> Option<Bounds> {
+            let points = corners.iter().map(|&v| self.vertices[v as usize]);
+            points.map(|p| (p, p)).reduce(join)
+        };
+        let chunks: Vec<Option<Bounds>> = self
+            .corners
             .vertex
-            .iter()
-            .map(|&v| self.vertices[v as usize])
-            .fold(None, |bounds, p| {
-                Some(bounds.map_or((p, p), |(lo, hi): (DVec3, DVec3)| (lo.min(p), hi.max(p))))
-            })
+            .par_chunks(CHUNK)
+            .map(of_chunk)
+            .collect();
+        chunks.into_iter().flatten().reduce(join)
     }
 
     /// Adds a face with the given vertex positions (metres, counter-clockwise), without normals

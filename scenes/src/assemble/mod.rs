@@ -1,13 +1,15 @@
 //! Puts faces into a scene so that its invariants hold: planar and convex polygons go in as they
 //! are, others are cut into triangles, and faces without area are dropped; each is counted.
 
+mod fragment;
 mod polygon;
 mod triangulate;
 
-use crate::id::{FaceId, MaterialId, ObjectId};
-use crate::scene::{Face, Scene};
-use glam::{DVec3, Vec2, Vec3};
-use polygon::Shape;
+pub(crate) use fragment::{Count, FACES, Fragment, append};
+
+use crate::id::{MaterialId, ObjectId};
+use crate::scene::Scene;
+use glam::{Vec2, Vec3};
 
 /// Largest coordinate in metres that a scene may have: its square is still finite in f32, in which
 /// rays work. (A light year is 9.5e15 m.)
@@ -47,13 +49,11 @@ pub(crate) enum Outcome {
     CutNonPlanar,
 }
 
-/// A scene that is being filled.
+/// A scene that is being filled polygon by polygon.
 #[derive(Debug, Default)]
 pub(crate) struct Assembly {
     /// The scene so far.
     pub(crate) scene: Scene,
-    ring: Vec<Corner>,
-    points: Vec<DVec3>,
 }
 
 impl Assembly {
@@ -65,111 +65,15 @@ impl Assembly {
         object: ObjectId,
         material: MaterialId,
     ) -> Outcome {
-        self.take_ring(corners);
-        if self.ring.len() < 3 || !polygon::normalise(&mut self.points) {
-            return Outcome::Dropped;
-        }
-        match polygon::classify(&self.points) {
-            Shape::Degenerate => Outcome::Dropped,
-            Shape::Convex => {
-                let ring = std::mem::take(&mut self.ring);
-                self.push_face(ring.iter().copied(), attributes, object, material);
-                self.ring = ring;
-                Outcome::Kept
-            }
-            Shape::Concave => {
-                self.push_triangles(attributes, object, material);
-                Outcome::CutConcave
-            }
-            Shape::NonPlanar => {
-                self.push_triangles(attributes, object, material);
-                Outcome::CutNonPlanar
-            }
-        }
-    }
-
-    /// Copies the corners, leaving out those at the same place as the one before.
-    fn take_ring(&mut self, corners: &[Corner]) {
-        self.ring.clear();
-        self.points.clear();
-        for &corner in corners {
-            let point = self.scene.vertices[corner.vertex as usize];
-            if self.points.last() != Some(&point) {
-                self.ring.push(corner);
-                self.points.push(point);
-            }
-        }
-        while self.points.len() > 1 && self.points.first() == self.points.last() {
-            self.ring.pop();
-            self.points.pop();
-        }
-    }
-
-    fn push_triangles(&mut self, attributes: Attributes, object: ObjectId, material: MaterialId) {
-        let normal = polygon::doubled_area(&self.points).normalize();
-        for triangle in triangulate::triangulate(&self.points, normal) {
-            let [a, b, c] = triangle.map(|i| self.points[i]);
-            // Against the polygon's extent, which is one: a cut may leave slivers of rounding.
-            if polygon::has_no_area((b - a).cross(c - a)) {
-                continue;
-            }
-            let corners = triangle.map(|i| self.ring[i]);
-            self.push_face(corners.into_iter(), attributes, object, material);
-        }
-    }
-
-    fn push_face(
-        &mut self,
-        corners: impl ExactSizeIterator<Item = Corner> + Clone,
-        attributes: Attributes,
-        object: ObjectId,
-        material: MaterialId,
-    ) {
-        let stored = &mut self.scene.corners;
-        let first = stored.vertex.len();
-        let count = corners.len();
-        // Checked here once: corner indices are 32 bits wide.
-        let _last = FaceId::new(first + count);
-        self.scene.faces.push(Face {
-            first_corner: first as u32,
-            corner_count: count as u32,
-            object,
-            material,
-        });
-        stored.vertex.extend(corners.clone().map(|c| c.vertex));
-        extend(
-            &mut stored.normal,
-            attributes.normal,
-            first,
-            corners.clone().map(|c| c.normal),
+        let mut fragment = Fragment::default();
+        let outcome = fragment.push(
+            &self.scene.vertices,
+            corners,
+            attributes,
+            (object, material),
         );
-        extend(
-            &mut stored.uv0,
-            attributes.uv0,
-            first,
-            corners.clone().map(|c| c.uv0),
-        );
-        extend(
-            &mut stored.uv1,
-            attributes.uv1,
-            first,
-            corners.map(|c| c.uv1),
-        );
-    }
-}
-
-/// Appends an attribute to its array, which stays empty until the first face that has it.
-fn extend<T: Copy + Default>(
-    array: &mut Vec<T>,
-    present: bool,
-    first: usize,
-    values: impl ExactSizeIterator<Item = T>,
-) {
-    if present {
-        array.resize(first, T::default());
-        array.extend(values);
-    } else if !array.is_empty() {
-        array.resize(first + values.len(), T::default());
+        append(&mut self.scene, vec![fragment]);
+        outcome
     }
 }
 
@@ -178,6 +82,7 @@ mod tests {
     use super::*;
     use crate::material::Material;
     use crate::radiometry::Reflectance;
+    use glam::DVec3;
     use proptest::prelude::*;
 
     fn assemble(points: &[DVec3]) -> (Assembly, Outcome) {

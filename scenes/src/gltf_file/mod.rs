@@ -8,20 +8,20 @@
 mod accessor;
 mod error;
 mod material;
+mod objects;
 mod primitive;
 mod punctual;
 mod source;
 
 pub use error::GltfError;
 
-use crate::assemble::Assembly;
 use crate::id::MaterialId;
 use crate::load::{FacePlace, LoadError, Part, Place, Warning, unique_name};
-use crate::scene::UnitSystem;
+use crate::scene::{Scene, UnitSystem};
 use glam::{DMat4, DQuat, DVec3, DVec4};
 use gltf::scene::Transform;
 use material::{Materials, UvMapping};
-use primitive::Tally;
+use objects::{Primitive, Tally};
 use source::Source;
 use std::collections::HashSet;
 use std::path::Path;
@@ -32,25 +32,26 @@ pub(crate) fn read(file: &Path, named_at: Option<&Place>) -> Result<Part, LoadEr
     let mut reader = Reader {
         source: &source,
         materials: Materials::new(&source),
-        assembly: Assembly::default(),
+        scene: Scene::default(),
         part: Part::default(),
         uvs: Vec::new(),
         default_material: None,
         names: HashSet::new(),
-        tally: Tally::default(),
+        primitives: Vec::new(),
     };
     for material in source.document.materials() {
         reader.add_material(&material)?;
     }
     reader.add_nodes()?;
-    Ok(reader.finish())
+    let tally = objects::add(&source, &mut reader.scene, &reader.primitives, &reader.uvs)?;
+    Ok(reader.finish(tally))
 }
 
 /// Everything that is known while nodes are turned into faces.
 struct Reader<'s> {
     source: &'s Source<'s>,
     materials: Materials<'s>,
-    assembly: Assembly,
+    scene: Scene,
     /// Material sources; the scene is put in at the end.
     part: Part,
     /// How each material addresses its texture.
@@ -58,15 +59,16 @@ struct Reader<'s> {
     default_material: Option<MaterialId>,
     /// Names of objects, lights and cameras so far.
     names: HashSet<String>,
-    tally: Tally,
+    /// What the objects are made of, in order.
+    primitives: Vec<Primitive<'s>>,
 }
 
-impl Reader<'_> {
+impl<'s> Reader<'s> {
     fn add_material(&mut self, material: &gltf::Material) -> Result<MaterialId, LoadError> {
-        let converted = self.materials.convert(material, &mut self.assembly.scene)?;
+        let converted = self.materials.convert(material, &mut self.scene)?;
         self.part.materials.push(converted.source);
         self.uvs.push(converted.uv);
-        Ok(self.assembly.scene.push_material(converted.material))
+        Ok(self.scene.push_material(converted.material))
     }
 
     /// The material of a primitive, with glTF's white default where it names none.
@@ -85,11 +87,12 @@ impl Reader<'_> {
     /// Visits the nodes of the default scene, of the first where there is no default, or all roots
     /// where there is no scene.
     fn add_nodes(&mut self) -> Result<(), LoadError> {
-        let document = &self.source.document;
+        let source: &'s Source = self.source;
+        let document = &source.document;
         let scene = document
             .default_scene()
             .or_else(|| document.scenes().next());
-        let roots: Vec<gltf::Node> = if let Some(scene) = scene {
+        let roots: Vec<gltf::Node<'s>> = if let Some(scene) = scene {
             scene.nodes().collect()
         } else {
             let children: HashSet<usize> = document
@@ -100,7 +103,7 @@ impl Reader<'_> {
             document.nodes().filter(is_root).collect()
         };
         // A list of what is left to do instead of recursion: files may nest deeper than the stack.
-        let mut pending: Vec<(gltf::Node, DMat4)> = roots
+        let mut pending: Vec<(gltf::Node<'s>, DMat4)> = roots
             .into_iter()
             .rev()
             .map(|node| (node, DMat4::IDENTITY))
@@ -116,13 +119,13 @@ impl Reader<'_> {
             }
             let transform = parent * local_transform(&node);
             self.add_node(&node, &transform)?;
-            let children: Vec<gltf::Node> = node.children().collect();
+            let children: Vec<gltf::Node<'s>> = node.children().collect();
             pending.extend(children.into_iter().rev().map(|child| (child, transform)));
         }
         Ok(())
     }
 
-    fn add_node(&mut self, node: &gltf::Node, transform: &DMat4) -> Result<(), LoadError> {
+    fn add_node(&mut self, node: &gltf::Node<'s>, transform: &DMat4) -> Result<(), LoadError> {
         if !transform.is_finite() {
             return Err(GltfError::Value {
                 file: self.source.file.to_owned(),
@@ -134,12 +137,12 @@ impl Reader<'_> {
         if let Some(light) = node.light() {
             let name = self.name(node.name().or(light.name()), "light");
             let light = punctual::light(self.source, &light, &name, transform)?;
-            self.assembly.scene.lights.push(light);
+            self.scene.lights.push(light);
         }
         if let Some(camera) = node.camera() {
             let name = self.name(node.name().or(camera.name()), "camera");
             let camera = punctual::camera(self.source, &camera, &name, transform)?;
-            self.assembly.scene.cameras.push(camera);
+            self.scene.cameras.push(camera);
         }
         if let Some(mesh) = node.mesh() {
             let name = self.name(node.name().or(mesh.name()), "object");
@@ -157,75 +160,50 @@ impl Reader<'_> {
 
     fn add_mesh(
         &mut self,
-        mesh: &gltf::Mesh,
+        mesh: &gltf::Mesh<'s>,
         name: String,
         transform: &DMat4,
     ) -> Result<(), LoadError> {
-        let faces_before = self.assembly.scene.faces.len();
-        let object = self.assembly.scene.push_object(name);
-        let mut number = 0;
+        let object = self.scene.push_object(name);
         for primitive in mesh.primitives() {
             let material = self.material(&primitive.material())?;
-            let Some(geometry) = primitive::read(
-                self.source,
-                mesh,
-                &primitive,
-                transform,
-                &self.uvs[material.index()],
-            )?
-            else {
-                self.tally.lines_and_points += 1;
-                continue;
-            };
-            let vertices = self.assembly.scene.vertices.len() + geometry.vertex_count();
-            let corners = self.assembly.scene.corners.vertex.len() + geometry.corner_count();
-            if vertices.max(corners) > u32::MAX as usize {
-                return Err(GltfError::TooLarge {
-                    file: self.source.file.to_owned(),
-                }
-                .into());
-            }
-            geometry.push(
-                &mut self.assembly,
-                (object, material),
-                &mut number,
-                &mut self.tally,
-            );
-        }
-        if self.assembly.scene.faces.len() == faces_before {
-            let unused = self.assembly.scene.objects.pop();
-            let first = unused.map(|object| object.name).unwrap_or_default();
-            self.tally.empty_objects.push(first);
+            self.primitives.push(Primitive {
+                object,
+                material,
+                mesh: mesh.clone(),
+                content: primitive,
+                transform: *transform,
+            });
         }
         Ok(())
     }
 
-    fn finish(self) -> Part {
+    fn finish(self, tally: Tally) -> Part {
         let mut part = self.part;
         let place = Place::file(self.source.file);
         part.warnings = self.materials.into_warnings();
-        if let Some((object, number)) = self.tally.first_dropped {
+        if let Some((object, number)) = tally.first_dropped {
             let first = FacePlace {
                 place: place.clone(),
                 object,
                 number,
             };
-            let count = self.tally.dropped;
+            let count = tally.dropped;
             part.warnings
                 .push(Warning::DegenerateFaces { count, first });
         }
-        if let Some(first) = self.tally.empty_objects.first() {
+        if let Some(first) = tally.empty_objects.first() {
             part.warnings.push(Warning::EmptyObjects {
-                count: self.tally.empty_objects.len(),
+                count: tally.empty_objects.len(),
                 place: place.clone(),
                 first: first.clone(),
             });
         }
-        if self.tally.lines_and_points > 0 {
-            let count = self.tally.lines_and_points;
+        if tally.lines_and_points > 0 {
+            let count = tally.lines_and_points;
             part.warnings.push(Warning::LinesAndPoints { count, place });
         }
-        part.scene = self.assembly.scene;
+        part.scene = self.scene;
         part.units = Some(UnitSystem::Photometric);
         part
     }

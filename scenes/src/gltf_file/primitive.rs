@@ -4,31 +4,20 @@ use super::accessor;
 use super::error::GltfError;
 use super::material::UvMapping;
 use super::source::Source;
-use crate::assemble::{Assembly, Attributes, Corner, Outcome};
-use crate::id::{MaterialId, ObjectId};
+use crate::assemble::{Attributes, Corner};
 use glam::{DMat3, DMat4, DVec3, DVec4, Vec2, Vec3};
 use gltf::Semantic;
 use gltf::accessor::{DataType, Dimensions};
 use gltf::mesh::Mode;
 use gltf::mesh::util::ReadTexCoords;
 
-/// What was left out, counted.
-#[derive(Debug, Default)]
-pub(super) struct Tally {
-    pub(super) dropped: usize,
-    /// Object and number of the first dropped face.
-    pub(super) first_dropped: Option<(String, usize)>,
-    pub(super) lines_and_points: usize,
-    pub(super) empty_objects: Vec<String>,
-}
-
 /// The triangles of a primitive.
 pub(super) struct Geometry {
-    positions: Vec<DVec3>,
+    pub(super) positions: Vec<DVec3>,
     normals: Vec<Vec3>,
     uv0: Vec<Vec2>,
     uv1: Vec<Vec2>,
-    triangles: Vec<[u32; 3]>,
+    pub(super) triangles: Vec<[u32; 3]>,
 }
 
 /// Reads a primitive, or nothing when it is made of points or lines. `uv` is how its material's
@@ -184,47 +173,25 @@ fn triangles(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
 }
 
 impl Geometry {
-    pub(super) fn vertex_count(&self) -> usize {
-        self.positions.len()
-    }
-
-    pub(super) fn corner_count(&self) -> usize {
-        3 * self.triangles.len()
-    }
-
-    /// Adds the triangles to a scene. `number` counts the object's faces in the file.
-    pub(super) fn push(
-        &self,
-        assembly: &mut Assembly,
-        (object, material): (ObjectId, MaterialId),
-        number: &mut usize,
-        tally: &mut Tally,
-    ) {
-        let base = assembly.scene.vertices.len() as u32;
-        assembly.scene.vertices.extend_from_slice(&self.positions);
-        let attributes = Attributes {
+    /// Which attributes the vertices have.
+    pub(super) fn attributes(&self) -> Attributes {
+        Attributes {
             normal: !self.normals.is_empty(),
             uv0: !self.uv0.is_empty(),
             uv1: !self.uv1.is_empty(),
-        };
-        for triangle in &self.triangles {
-            *number += 1;
-            let corners = triangle.map(|index| {
-                let i = index as usize;
-                Corner {
-                    vertex: base + index,
-                    normal: self.normals.get(i).copied().unwrap_or_default(),
-                    uv0: self.uv0.get(i).copied().unwrap_or_default(),
-                    uv1: self.uv1.get(i).copied().unwrap_or_default(),
-                }
-            });
-            if assembly.push_polygon(&corners, attributes, object, material) == Outcome::Dropped {
-                tally.dropped += 1;
-                let name = &assembly.scene.objects[object.index()].name;
-                tally
-                    .first_dropped
-                    .get_or_insert_with(|| (name.clone(), *number));
-            }
         }
+    }
+
+    /// The corners of a triangle in a scene where the geometry's first vertex has the number `base`.
+    pub(super) fn corners(&self, triangle: [u32; 3], base: u32) -> [Corner; 3] {
+        triangle.map(|index| {
+            let i = index as usize;
+            Corner {
+                vertex: base + index,
+                normal: self.normals.get(i).copied().unwrap_or_default(),
+                uv0: self.uv0.get(i).copied().unwrap_or_default(),
+                uv1: self.uv1.get(i).copied().unwrap_or_default(),
+            }
+        })
     }
 }

@@ -12,6 +12,8 @@ use crate::light::LightKind;
 use crate::material::{Material, Specular};
 use crate::radiometry::{Reflectance, Rgb};
 use crate::scene::{Scene, UnitSystem};
+use glam::DVec3;
+use rayon::prelude::*;
 use std::path::Path;
 
 /// Luminous efficacy by which photometric values are divided where both systems are mixed: that of
@@ -145,12 +147,12 @@ fn check_material(material: &Material, source: &MaterialSource) -> Result<(), Ma
 
 fn check_extent(scene: &Scene, file: &Path) -> Result<(), ExtentError> {
     let is_far = |x: f64| x.abs() > MAX_COORDINATE || x.is_nan();
-    let is_far_vertex = |vertex: u32| {
-        scene.vertices[vertex as usize]
-            .to_array()
-            .into_iter()
-            .any(is_far)
-    };
+    let is_far_point = |point: &DVec3| point.to_array().into_iter().any(is_far);
+    if !scene.vertices.par_iter().any(is_far_point) {
+        return Ok(());
+    }
+    // Only vertices that faces use count.
+    let is_far_vertex = |vertex: u32| is_far_point(&scene.vertices[vertex as usize]);
     let Some(corner) = scene.corners.vertex.iter().position(|&v| is_far_vertex(v)) else {
         return Ok(());
     };

@@ -90,26 +90,7 @@ impl Merged {
         for vertex in &mut part.corners.vertex {
             *vertex += first_vertex as u32;
         }
-        let added = part.corners.vertex.len();
-        append(
-            &mut scene.corners.normal,
-            part.corners.normal,
-            first_corner,
-            added,
-        );
-        append(
-            &mut scene.corners.uv0,
-            part.corners.uv0,
-            first_corner,
-            added,
-        );
-        append(
-            &mut scene.corners.uv1,
-            part.corners.uv1,
-            first_corner,
-            added,
-        );
-        scene.corners.vertex.extend(part.corners.vertex);
+        scene.corners.append(part.corners);
         scene.vertices.extend(part.vertices);
         scene.faces.extend(part.faces);
         scene.objects.extend(part.objects);
@@ -128,16 +109,6 @@ impl Merged {
             && s.lights.is_empty()
             && s.cameras.is_empty()
     }
-}
-
-/// Appends an attribute that either side may not have; what is missing is zero.
-fn append<T: Copy + Default>(to: &mut Vec<T>, from: Vec<T>, before: usize, added: usize) {
-    if to.is_empty() && from.is_empty() {
-        return;
-    }
-    to.resize(before, T::default());
-    to.extend(from);
-    to.resize(before + added, T::default());
 }
 
 /// Gives names that are taken a number.

@@ -5,25 +5,31 @@
 //! are flat and convex. `Ke` is radiance. A file is read as UTF-8; other bytes are replaced, which
 //! only names can show.
 
+mod corners;
 mod error;
 mod library;
 mod locate;
 mod mtl;
+mod pieces;
 mod reader;
+mod sections;
 mod survey;
 
 pub use error::{MtlError, ObjError};
 
 use crate::load::{LoadError, Part, Place, UnknownName, read_file};
 use library::Libraries;
+use rayon::prelude::*;
 use reader::Reader;
-use std::cell::Cell;
 use std::io::Read;
 use std::path::Path;
-use survey::Survey;
+use survey::{Presence, Survey};
 
 /// The parser's name of faces before the first `o` or `g`.
 const UNNAMED: &str = "unnamed_object";
+
+/// The line that makes the parser ask for the libraries.
+const LIBRARIES: &[u8] = b"mtllib all\n";
 
 /// Keeps polygons, gives each attribute its own index (a shared one would tear vertices apart and,
 /// where only some corners have an attribute, assign it wrongly), and leaves out points and lines.
@@ -36,8 +42,9 @@ const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
 
 /// Reads an OBJ file and the libraries and images that it names.
 pub(crate) fn read(file: &Path, named_at: Option<&Place>) -> Result<Part, LoadError> {
-    let bytes = read_file(file, named_at)?;
-    parse(file, &String::from_utf8_lossy(&bytes))
+    let text = String::from_utf8(read_file(file, named_at)?)
+        .unwrap_or_else(|error| String::from_utf8_lossy(error.as_bytes()).into_owned());
+    parse(file, &text)
 }
 
 fn parse(file: &Path, text: &str) -> Result<Part, LoadError> {
@@ -52,16 +59,21 @@ fn parse(file: &Path, text: &str) -> Result<Part, LoadError> {
             return Err(error.into());
         }
     }
-    let shown = survey::for_parser(&text, &survey);
+    let (materials, numbers) =
+        tobj::load_mtl_buf(&mut libraries.text.as_bytes()).unwrap_or_default();
     // All libraries come first and only once: a `mtllib` line may stand behind its first use.
-    let mut lines = b"mtllib all\n".chain(shown.as_bytes());
-    let library = Cell::new(libraries.text.as_bytes());
-    let parsed = tobj::load_obj_buf(&mut lines, &OPTIONS, |_| {
-        tobj::load_mtl_buf(&mut library.take())
-    });
-    let (models, materials) = parsed.map_err(|source| locate::explain(&text, file, source))?;
+    let library = |_: &Path| Ok((Vec::new(), numbers.clone()));
+    let load = |first: &[u8], lines: &[u8]| {
+        tobj::load_obj_buf(&mut first.chain(lines), &OPTIONS, library).map(|(models, _)| models)
+    };
+    let by_sections = sections::parse(&text, &survey.pieces, |section| load(LIBRARIES, section));
+    let models = match by_sections {
+        Some(models) => models,
+        None => load(LIBRARIES, survey::for_parser(&text, &survey).as_bytes())
+            .map_err(|source| locate::explain(&text, file, source))?,
+    };
     let is_finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
-    if !models.iter().all(|m| {
+    if !models.par_iter().all(|m| {
         is_finite(&m.mesh.positions) && is_finite(&m.mesh.normals) && is_finite(&m.mesh.texcoords)
     }) && let Some(error) = locate::not_finite(&text, file)
     {
@@ -69,17 +81,12 @@ fn parse(file: &Path, text: &str) -> Result<Part, LoadError> {
     }
 
     let mut reader = Reader::new(file, &text, libraries.warnings);
-    for material in materials.unwrap_or_default() {
+    for material in materials {
         let place = libraries.places.get(&material.name).cloned();
         let place = place.unwrap_or_else(|| Place::file(file));
         reader.add_material(&material, place, folder)?;
     }
-    if survey.has_attributes {
-        reader.present = survey::present_attributes(&shown);
-    }
-    for model in &models {
-        reader.add_model(model)?;
-    }
+    reader.add_models(&models, &Presence::new(&text, &survey))?;
     Ok(reader.finish(&survey))
 }
 

@@ -1,7 +1,10 @@
-//! One pass over the text of an OBJ file before it is parsed: what the parser does not tell (names
-//! of materials and empty objects with their lines) and what it must not see (lines, which it would
-//! take for faces; continued lines, which it does not know).
+//! One pass over the text of an OBJ file before it is parsed, in parallel: what the parser does not tell
+//! (names of materials and empty objects with their lines, what each face names) and what it must not
+//! see (lines, which it would take for faces; continued lines, which it does not know).
 
+use super::corners;
+use super::pieces::Piece;
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::HashSet;
 
@@ -30,6 +33,10 @@ pub(super) struct Survey<'t> {
     pub(super) has_negative_indices: bool,
     /// Some line must be rewritten before the parser sees it.
     pub(super) needs_rewriting: bool,
+    /// What the corners of faces name.
+    pub(super) attributes: Attributes,
+    /// The text in pieces.
+    pub(super) pieces: Vec<Piece<'t>>,
 }
 
 /// The keyword of a line and what follows it, both trimmed.
@@ -43,35 +50,35 @@ impl<'t> Survey<'t> {
     /// Goes through the text once.
     pub(super) fn new(text: &'t str) -> Self {
         let mut survey = Self::default();
+        survey.pieces = super::pieces::cut(text)
+            .into_par_iter()
+            .map(|range| Piece::survey(text, range))
+            .collect();
         let mut used: HashSet<&str> = HashSet::new();
-        for (index, raw) in text.lines().enumerate() {
-            let line = index + 1;
-            // The quick way out for the lines that make up nearly all of a file.
-            if raw.starts_with("v ") {
-                continue;
+        let mut before = 0;
+        for piece in &mut survey.pieces {
+            let moved = |named: &Named<'t>| Named {
+                name: named.name,
+                line: named.line + before,
+            };
+            survey.libraries.extend(piece.libraries.iter().map(moved));
+            survey.objects.extend(piece.objects.iter().map(moved));
+            let first_uses = piece
+                .materials
+                .iter()
+                .filter(|named| used.insert(named.name));
+            survey.materials.extend(first_uses.map(moved));
+            if let Some(line) = piece.first_line_or_point
+                && survey.lines_and_points == 0
+            {
+                survey.first_line_or_point = line + before;
             }
-            let (keyword, rest) = split_keyword(raw);
-            let named = Named { name: rest, line };
-            match keyword {
-                "f" => survey.has_negative_indices |= rest.contains('-'),
-                "vt" | "vn" => survey.has_attributes = true,
-                "o" | "g" => survey.objects.push(named),
-                "mtllib" => survey.libraries.push(named),
-                "usemtl" => {
-                    survey.needs_rewriting |= raw.contains('\t');
-                    if used.insert(rest) {
-                        survey.materials.push(named);
-                    }
-                }
-                "l" | "p" => {
-                    if survey.lines_and_points == 0 {
-                        survey.first_line_or_point = line;
-                    }
-                    survey.lines_and_points += 1;
-                    survey.needs_rewriting = true;
-                }
-                _ => {}
-            }
+            survey.lines_and_points += piece.lines_and_points;
+            survey.has_attributes |= !piece.values[1].is_empty() || !piece.values[2].is_empty();
+            survey.has_negative_indices |= piece.has_negative_indices;
+            survey.needs_rewriting |= piece.needs_rewriting;
+            survey.attributes = survey.attributes.and(piece.attributes);
+            before += piece.lines;
         }
         survey
     }
@@ -79,7 +86,8 @@ impl<'t> Survey<'t> {
 
 /// The text with continued lines (`\` at the end) joined; every line keeps its number.
 pub(super) fn join_continued(text: &str) -> Cow<'_, str> {
-    if !text.contains("\\\n") && !text.contains("\\\r\n") {
+    // A search for one byte is quick; most files have none.
+    if !text.contains('\\') || !(text.contains("\\\n") || text.contains("\\\r\n")) {
         return Cow::Borrowed(text);
     }
     let mut joined = String::with_capacity(text.len());
@@ -117,15 +125,65 @@ pub(super) fn for_parser<'t>(text: &'t str, survey: &Survey) -> Cow<'t, str> {
 }
 
 /// Which attributes a face's corner names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Present {
     pub(super) uv: bool,
     pub(super) normal: bool,
 }
 
-/// For each corner of each face of three or more corners, in order: what it names. The parser makes
-/// up attributes where a corner of a file that has them elsewhere names none.
-pub(super) fn present_attributes(text: &str) -> Vec<Present> {
+/// Which attributes the corners of many faces name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Attributes {
+    /// There are no faces.
+    #[default]
+    Nothing,
+    /// All corners name the same.
+    Alike(Present),
+    /// Some corners differ, or are not plainly written.
+    Mixed,
+}
+
+impl Attributes {
+    /// What the corners of both name.
+    pub(super) fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Nothing, one) | (one, Self::Nothing) => one,
+            (Self::Alike(a), Self::Alike(b)) if a == b => self,
+            _ => Self::Mixed,
+        }
+    }
+}
+
+/// What each corner of a file names. The parser makes up attributes where a corner of a file that has
+/// them elsewhere names none.
+pub(super) enum Presence {
+    /// All corners the same.
+    Alike(Present),
+    /// For each corner of each face of three or more corners, in order.
+    Each(Vec<Present>),
+}
+
+impl Presence {
+    /// Goes through the faces again only where they differ.
+    pub(super) fn new(text: &str, survey: &Survey) -> Self {
+        match survey.attributes {
+            _ if !survey.has_attributes => Self::Alike(Present::default()),
+            Attributes::Nothing => Self::Alike(Present::default()),
+            Attributes::Alike(present) => Self::Alike(present),
+            Attributes::Mixed => Self::Each(present_attributes(text)),
+        }
+    }
+
+    /// What a corner names, by its number in the file.
+    pub(super) fn of(&self, corner: usize) -> Present {
+        match self {
+            Self::Alike(present) => *present,
+            Self::Each(present) => present.get(corner).copied().unwrap_or_default(),
+        }
+    }
+}
+
+fn present_attributes(text: &str) -> Vec<Present> {
     let mut present = Vec::new();
     for raw in text.lines() {
         if raw.starts_with("v ") {
@@ -136,14 +194,7 @@ pub(super) fn present_attributes(text: &str) -> Vec<Present> {
             continue;
         }
         let first = present.len();
-        present.extend(rest.split_whitespace().map(|corner| {
-            let mut parts = corner.split('/').skip(1);
-            let mut names = || parts.next().is_some_and(|part| !part.is_empty());
-            Present {
-                uv: names(),
-                normal: names(),
-            }
-        }));
+        present.extend(rest.split_whitespace().map(corners::present));
         if present.len() - first < 3 {
             present.truncate(first);
         }

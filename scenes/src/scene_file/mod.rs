@@ -256,8 +256,9 @@ fn add_polygons(
         .enumerate()
         .map(|(index, object)| (object.name.clone(), ObjectId::new(index)))
         .collect();
-    let mut assembly = Assembly::default();
-    assembly.scene = std::mem::take(&mut merged.scene);
+    let mut assembly = Assembly {
+        scene: std::mem::take(&mut merged.scene),
+    };
     for value in polygons {
         polygon::read(&value, settings, &mut assembly, &materials, &mut objects)?;
     }
