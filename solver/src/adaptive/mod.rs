@@ -21,10 +21,12 @@ mod adapted;
 mod budget;
 mod gathering;
 mod indirect_field;
+mod memory;
 
 pub use adapted::Adapted;
 pub use budget::{Budget, Changes, ROW_RAYS, fewest_rays};
 pub use indirect_field::FieldGather;
+pub use memory::{bytes_to_gather, bytes_to_refine, bytes_to_solve, first_patches};
 
 use crate::gather::{Components, ErrorParts, Tally};
 use crate::pilot::PilotError;
@@ -98,6 +100,8 @@ pub enum Ending {
     Stopped,
     /// More rays or patches than there may be would be needed.
     OutOfReach,
+    /// More patches than [`AdaptiveConfig::most_patches`] would be needed.
+    TooManyPatches,
 }
 
 /// What is asked for.
@@ -107,6 +111,9 @@ pub struct AdaptiveConfig {
     pub error: f64,
     /// Which light.
     pub components: Components,
+    /// Patches that no mesh may be asked to have more of, for want of memory: rays make up for the mesh
+    /// as far as they can.
+    pub most_patches: usize,
     /// Seed of all random numbers.
     pub seed: u64,
 }
@@ -161,6 +168,7 @@ pub fn irradiance(
         }
     }
     let mut result = Adaptive::none();
+    let mut is_held_back = false;
     for _ in 0..MAX_ROUNDS {
         if !gathering.go_on(lookup.as_ref(), &budget, Stage::Gathering, control) {
             return Ok(result);
@@ -186,9 +194,17 @@ pub fn irradiance(
         let mut solved = None;
         if let Some(scene) = adapted.as_ref().filter(|_| fixed > MESH_SHARE * error) {
             let free = plan(Changes::All);
-            if free.patches > budget.patches {
-                let worthwhile = (WORTHWHILE * budget.patches as f64) as usize;
-                let patches = free.patches.max(worthwhile);
+            let worthwhile = (WORTHWHILE * budget.patches as f64) as usize;
+            let grows = free.patches > budget.patches;
+            if grows && worthwhile > config.most_patches {
+                is_held_back = true;
+                // What the mesh leaves is too much by itself.
+                if fixed >= error {
+                    result.ending = Ending::TooManyPatches;
+                    return Ok(result);
+                }
+            } else if grows {
+                let patches = free.patches.max(worthwhile).min(config.most_patches);
                 next = Budget { patches, ..free };
                 solved = scene.solve(patches, control)?;
             }
@@ -199,8 +215,7 @@ pub fn irradiance(
             shadow_rays: next.shadow_rays.max(spent.shadow_rays),
         };
         if next == spent {
-            result.ending = Ending::OutOfReach;
-            return Ok(result);
+            break;
         }
         if solved.is_some() {
             lookup = solved;
@@ -208,7 +223,11 @@ pub fn irradiance(
         }
         budget = next;
     }
-    result.ending = Ending::OutOfReach;
+    result.ending = if is_held_back {
+        Ending::TooManyPatches
+    } else {
+        Ending::OutOfReach
+    };
     Ok(result)
 }
 
