@@ -90,6 +90,15 @@ pub struct Replicates {
 }
 
 impl Accuracy {
+    /// Memory of the accuracy of so many receivers, in bytes, while it is judged from so many replicates of each.
+    pub fn bytes_for(receivers: usize, replicates: usize) -> usize {
+        let judging = size_of::<Replicates>()
+            + 2 * replicates * size_of::<Rgb>()
+            + 2 * size_of::<(Rgb, Rgb)>()
+            + size_of::<[f64; 10]>();
+        receivers * (3 * size_of::<Rgb>() + if replicates > 0 { judging } else { 0 })
+    }
+
     /// The accuracy of receivers from at least two replicates of each.
     ///
     /// # Panics

@@ -73,6 +73,14 @@ struct Share {
 }
 
 impl Display {
+    /// Memory while so many patches are joined, in bytes: each has about four corners and as many vertices as
+    /// patches that it shares them with, once in polygons, nodes and borders and once in what is made of them.
+    pub fn bytes_for(patches: usize) -> usize {
+        const LISTS: usize = 10 * size_of::<Vec<u32>>();
+        const CORNERS: usize = 4 * size_of::<(DVec3, Share, [(u64, u64); 2])>();
+        patches * (LISTS + CORNERS + size_of::<(Vertex, Piece, DVec3)>())
+    }
+
     /// Joins the patches of a world. `exposed` tells which lie in the open (not inside a solid), and
     /// `joins` which pairs may share a vertex as far as the caller is concerned.
     ///

@@ -142,6 +142,23 @@ impl Film {
         }
     }
 
+    /// Memory of a film of so many pixels, in bytes.
+    pub fn bytes_for(pixels: usize) -> usize {
+        pixels * size_of::<Pixel>()
+    }
+
+    /// The same while it is judged and exposed further: of each channel values, levels and scatters, and what is made
+    /// of them.
+    pub fn bytes_to_refine(pixels: usize) -> usize {
+        const CHANNEL: usize = size_of::<[f64; 9]>();
+        Self::bytes_for(pixels) + 3 * pixels * CHANNEL
+    }
+
+    /// Memory that it holds, in bytes.
+    pub fn bytes(&self) -> usize {
+        self.pixels.capacity() * size_of::<Pixel>()
+    }
+
     /// Width and height in pixels.
     pub fn size(&self) -> [usize; 2] {
         self.size

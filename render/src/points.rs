@@ -99,6 +99,15 @@ const INPUT: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 const OUTPUT: [&str; 6] = ["e_r", "e_g", "e_b", "se_r", "se_g", "se_b"];
 
 impl PointTable {
+    /// Memory of a table of so many points, in bytes, with the places that are made of it and the text of its results:
+    /// numbers of about ten digits.
+    pub fn bytes_for(points: usize) -> usize {
+        const DIGITS: usize = 12;
+        let columns = INPUT.len() + OUTPUT.len();
+        let record = size_of::<StringRecord>() + INPUT.len() * (size_of::<usize>() + DIGITS) + 64;
+        points * (record + 2 * size_of::<Point>() + size_of::<Estimate>() + columns * DIGITS)
+    }
+
     /// Reads a file.
     ///
     /// # Errors

@@ -15,6 +15,7 @@ pub mod family;
 mod html;
 pub mod machine;
 mod measure;
+mod memory;
 mod methods;
 pub mod metrics;
 mod operators;

@@ -142,6 +142,12 @@ impl PatchLight {
         objects
     }
 
+    /// Memory of the mesh of so many patches and of its file, in bytes, while it is made.
+    pub fn bytes_of_mesh(patches: usize) -> usize {
+        // About as many vertices and faces as patches.
+        Display::bytes_for(patches) + patches * 2 * size_of::<(Vertex, [u32; 10])>()
+    }
+
     /// The patches as a mesh without T-junctions, continuous over smooth surfaces of one material
     /// ([`Display`]); `errors` are those of the patches' irradiance, and `exposed` tells which patches
     /// lie in the open. Where smaller patches meet a larger one, that is a fan around its middle.

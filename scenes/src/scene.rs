@@ -109,6 +109,25 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Memory that its arrays hold, in bytes; names are too small to count.
+    pub fn bytes(&self) -> usize {
+        fn held<T>(values: &Vec<T>) -> usize {
+            values.capacity() * size_of::<T>()
+        }
+        let corners = &self.corners;
+        let textures = self.textures.iter().map(|texture| held(&texture.texels));
+        held(&self.vertices)
+            + held(&corners.vertex)
+            + held(&corners.normal)
+            + held(&corners.uv0)
+            + held(&corners.uv1)
+            + held(&self.faces)
+            + held(&self.objects)
+            + held(&self.materials)
+            + held(&self.lights)
+            + textures.sum::<usize>()
+    }
+
     /// The vertices of a face in metres, counter-clockwise from the front.
     pub fn polygon(&self, face: FaceId) -> impl ExactSizeIterator<Item = DVec3> + Clone + '_ {
         self.faces[face.index()]

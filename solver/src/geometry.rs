@@ -4,6 +4,7 @@
 //! The scale is a power of two, hence exact: a scene and its copy in other units give the same
 //! bits, and every bound on rounding can be stated once, for coordinates of at most 1/2.
 
+use crate::memory::held;
 use glam::{DVec3, Vec3};
 use luxel_scenes::{FaceId, Scene};
 
@@ -114,6 +115,23 @@ impl Geometry {
         }
     }
 
+    /// Memory that the geometry of a scene takes, in bytes.
+    pub fn bytes_for(scene: &Scene) -> usize {
+        scene.vertices.len() * size_of::<DVec3>()
+            + triangle_count(scene) * size_of::<([u32; 3], FaceId)>()
+            + scene.faces.len() * size_of::<(u32, DVec3, f64)>()
+    }
+
+    /// Memory that it holds, in bytes.
+    pub fn bytes(&self) -> usize {
+        held(&self.vertices)
+            + held(&self.triangles)
+            + held(&self.triangle_face)
+            + held(&self.face_first_triangle)
+            + held(&self.face_normal)
+            + held(&self.face_extent)
+    }
+
     /// The similarity to world space.
     pub fn frame(&self) -> &UnitFrame {
         &self.frame
@@ -186,6 +204,12 @@ impl Geometry {
         let [a, b, c] = self.triangle(id);
         a + (b - a) * u + (c - a) * v
     }
+}
+
+/// Triangles that the faces of a scene are cut into.
+pub fn triangle_count(scene: &Scene) -> usize {
+    let corners: usize = scene.faces.iter().map(|f| f.corner_count as usize).sum();
+    corners - 2 * scene.faces.len()
 }
 
 /// Unit roundoff of f32, u = 2⁻²⁴.

@@ -8,6 +8,8 @@ pub mod geometry;
 
 pub mod surface;
 
+mod memory;
+
 pub mod bvh;
 
 pub mod patches;

@@ -2,7 +2,7 @@
 
 use crate::bvh::{Bvh, Hit, Ray};
 use crate::direct::Lights;
-use crate::geometry::ray_origin;
+use crate::geometry::{Geometry, ray_origin, triangle_count};
 use crate::patches::{Density, MeshError, PatchId, PatchSize, Patches, Side};
 use crate::surface::{SurfacePoint, Surfaces};
 use glam::{DVec3, Vec3};
@@ -54,6 +54,17 @@ impl<'s> World<'s> {
             bvh,
             lights,
         }
+    }
+
+    /// Memory that a scene takes while it is prepared, in bytes: of the scene itself, of what is made of it, and of what
+    /// the ray tree is built from.
+    pub fn bytes_to_build(scene: &Scene) -> usize {
+        scene.bytes() + Geometry::bytes_for(scene) + Bvh::bytes_to_build(triangle_count(scene))
+    }
+
+    /// Memory that the scene and what was made of it hold, in bytes.
+    pub fn bytes(&self) -> usize {
+        self.scene().bytes() + self.surfaces.geometry().bytes() + self.bvh.bytes()
     }
 
     /// The scene.

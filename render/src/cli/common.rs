@@ -1,6 +1,7 @@
 //! Options that every verb takes.
 
 use super::goal::{Goal, RelativeError};
+use super::memory::MemoryLimit;
 use clap::ValueEnum;
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
@@ -21,6 +22,11 @@ pub(super) struct Common {
     /// Time to spend, such as 30s: the smallest error that can be reached in it
     #[arg(long, global = true, value_name = "T", value_parser = super::goal::parse_time, allow_hyphen_values = true)]
     pub(super) time: Option<Duration>,
+
+    /// Memory that may be held, such as 4G or 512M: what needs more is refused before it begins, and no result is
+    /// refined beyond it [default: no limit]
+    #[arg(long, global = true, value_name = "M", value_parser = super::memory::parse_memory, allow_hyphen_values = true)]
+    pub(super) max_memory: Option<MemoryLimit>,
 
     /// Number of threads [default: all cores]; does not change results
     #[arg(short = 'j', long, global = true, value_name = "N")]

@@ -1,12 +1,15 @@
 //! `luxel converge`: every method against one reference, as a page.
 
 use super::exit::{ExitCode, Failure};
+use super::footprint::Footprint;
+use super::memory;
 use super::scene;
 use super::{Context, Session};
 use crate::files::Output;
 use crate::image::exr;
 use crate::points::PointTable;
 use crate::report::budget::Budget;
+use crate::report::family::Family;
 use crate::report::reference::{self, Given, ReferenceError};
 use crate::report::study::{self, Setup, Study};
 use crate::report::{page, table};
@@ -17,6 +20,9 @@ use std::time::Instant;
 
 /// Seconds that a report takes when neither a time nor the number of sizes is given.
 const SECONDS: f64 = 60.0;
+
+/// Memory of a receiver in bytes: the reference, and values of each family that are kept for pictures and rows.
+const RECEIVER: usize = 2000;
 
 /// Measure every method against one reference and write a report
 ///
@@ -76,6 +82,7 @@ impl Converge {
             (_, name, _) => Some(scene::camera(&scene, name.as_deref())?),
         };
         let context = &session.context;
+        Footprint::to_prepare(&scene).require(context, || None)?;
         let study = context
             .common
             .install(|| self.measure(&World::new(&scene), camera, given, started, context))??;
@@ -96,6 +103,18 @@ impl Converge {
         context: &Context<'_>,
     ) -> Result<Study, Failure> {
         scene::require_light(world)?;
+        let receivers = match &given {
+            None => reference::POINTS,
+            Some(Given::Points { points, .. }) => points.len(),
+            Some(Given::Picture { picture, .. }) => picture.image.pixels.len(),
+        };
+        let held = Footprint::of(world).with("reference", RECEIVER * receivers);
+        let first = |family: &Family| family.bytes(0, receivers, world.scene());
+        let largest = Family::ALL.iter().map(first).max().unwrap_or(0);
+        held.with("the first size of a method", largest)
+            .require(context, || None)?;
+        let limit = context.common.max_memory;
+        let memory = limit.map(|limit| limit.0.get().saturating_sub(held.total()));
         let seed = context.common.seed;
         let time = context.common.time;
         let seconds = time.map_or(SECONDS, |time| time.as_secs_f64());
@@ -108,6 +127,7 @@ impl Converge {
             reference,
             camera,
             budget,
+            memory,
             seed,
             started,
         };
@@ -141,14 +161,16 @@ impl Converge {
         }
         let rows = table::rows(study).count();
         session.context.reporter.note(format_args!(
-            "{rows} measurements in {:.1} s",
-            study.seconds
+            "{rows} measurements in {:.1} s{}",
+            study.seconds,
+            memory::peak_in_words()
         ));
         let mut paths = vec![self.output.display().to_string()];
         paths.extend(csv.map(|path| path.display().to_string()));
         let text = if session.context.common.json {
             let mut json = table::to_json(study)?;
             json["output"] = paths.into();
+            memory::add_peak(&mut json);
             serde_json::to_string_pretty(&json)?
         } else {
             paths.join("\n")

@@ -6,7 +6,7 @@ use crate::progress::Progress;
 use clap::ValueEnum;
 use luxel_scenes::{Irradiance, Rgb};
 use luxel_solver::form_factors::{
-    AnalyticConfig, HemicubeConfig, RayCastConfig, Repair, Target, analytic_factors,
+    AnalyticConfig, Hemicube, HemicubeConfig, RayCastConfig, Repair, Target, analytic_factors,
     hemicube_factors, ray_cast, repair,
 };
 use luxel_solver::patches::{PatchId, Patches};
@@ -14,7 +14,7 @@ use luxel_solver::solvers::{
     Ambient, Config, Ledger, Solution, System, SystemError, Tolerance, conjugate_gradient, direct,
     gauss_seidel, jacobi, no_progress, source, southwell,
 };
-use luxel_solver::transport::{Dense, Symmetrised, Transport};
+use luxel_solver::transport::{Columns, Dense, Symmetrised, Transport};
 use luxel_solver::world::World;
 
 /// Patches up to which a dense matrix is made: 16 bytes for each pair, 1 GiB.
@@ -172,6 +172,28 @@ fn refused(world: &World<'_>, patches: &Patches, error: &SystemError) -> Failure
         _ => format!("{}: {error}", scene.name),
     };
     Failure::new(ExitCode::InvalidInput, text)
+}
+
+/// Memory while the form factors of so many patches are computed and, with a solver, solved, in bytes.
+pub(super) fn bytes_for(patches: usize, factors: Factors, solver: Option<Solver>) -> usize {
+    let matrix = Dense::bytes_for(patches);
+    let threads = rayon::current_num_threads();
+    let (errors, computing) = match factors {
+        // Of pairs i ≤ j exchange areas with their errors; rows with their errors, freed as they are put together: as
+        // much as one matrix.
+        Factors::Analytic(_) | Factors::RayCast(_) => (matrix, matrix),
+        // Rows before they are put together. Errors that are never written take no memory.
+        Factors::Hemicube(resolution) => (0, matrix + threads * Hemicube::bytes_for(resolution)),
+    };
+    let solving = match solver {
+        None | Some(Solver::Jacobi | Solver::GaussSeidel) => 0,
+        Some(Solver::Southwell) => Columns::bytes_for(patches, patches * patches),
+        // Exchange areas and the matrix that is made of them.
+        Some(Solver::ConjugateGradient) => 2 * matrix,
+        // The matrix as nalgebra has it, the system and its factors.
+        Some(Solver::Direct) => 3 * matrix,
+    };
+    matrix + errors + computing.max(solving)
 }
 
 /// Form factors between patches with their standard errors, row-major.

@@ -20,6 +20,8 @@ pub enum ExitCode {
     LimitExceeded = 5,
     /// The error that was asked for was not reached; the result is written and says what was.
     TargetMissed = 6,
+    /// More memory would be needed than `--max-memory`; nothing was done.
+    MemoryLimit = 7,
     /// The user stopped it; the last complete result is written, if there was one.
     Interrupted = 130,
 }

@@ -2,6 +2,8 @@
 
 use super::dense::{self, Factors};
 use super::exit::{ExitCode, Failure};
+use super::footprint::Footprint;
+use super::memory;
 use super::{Context, Session, scene};
 use crate::files::Output;
 use crate::matrix::NamedMatrix;
@@ -11,7 +13,7 @@ use luxel_solver::form_factors::{
     ObjectFactors, RayCastConfig, between_objects, ray_cast_between_objects,
     reciprocity_defect_of_largest,
 };
-use luxel_solver::patches::PatchSize;
+use luxel_solver::patches::{PatchSize, Patches};
 use luxel_solver::transport::{Dense, Transport};
 use luxel_solver::world::World;
 use std::path::{Path, PathBuf};
@@ -127,11 +129,12 @@ impl FormFactors {
             String::new()
         };
         context.reporter.note(format_args!(
-            "{n} objects, {seconds:.2} s; {error}reciprocity defect {reciprocity:.1e}"
+            "{n} objects, {seconds:.2} s{}; {error}reciprocity defect {reciprocity:.1e}",
+            memory::peak_in_words()
         ));
         let text = if context.common.json {
             let sums: Vec<f64> = (0..n).map(|row| matrix.row_sum(row)).collect();
-            serde_json::to_string_pretty(&serde_json::json!({
+            let mut json = serde_json::json!({
                 "objects": named.names,
                 "areas": factors.areas,
                 "F": named.rows,
@@ -142,7 +145,9 @@ impl FormFactors {
                 "method": super::name(&self.method),
                 "output": self.output.as_deref().map(|path| path.display().to_string()),
                 "seconds": seconds,
-            }))?
+            });
+            memory::add_peak(&mut json);
+            serde_json::to_string_pretty(&json)?
         } else if let Some(path) = &self.output {
             path.display().to_string()
         } else {
@@ -155,7 +160,9 @@ impl FormFactors {
     }
 
     fn compute(&self, scene: &Scene, context: &Context<'_>) -> Result<ObjectFactors, Failure> {
+        Footprint::to_prepare(scene).require(context, || None)?;
         let world = World::new(scene);
+        self.require_memory(&world, context)?;
         let factors = self.method.factors(self.rays, self.resolution, RAYS);
         if let Factors::RayCast(rays) = factors {
             let seed = context.common.seed;
@@ -167,6 +174,34 @@ impl FormFactors {
         let patches = world.mesh(PatchSize::Whole)?;
         let (matrix, errors) = dense::compute(&world, &patches, factors, context)?;
         Ok(between_objects(&world, &patches, &matrix, &errors))
+    }
+}
+
+impl FormFactors {
+    /// Refuses what would not fit into memory, and says what would.
+    fn require_memory(&self, world: &World<'_>, context: &Context<'_>) -> Result<(), Failure> {
+        let scene = world.scene();
+        let rays_alone = |method: Method| matches!(method, Method::Raycast);
+        let footprint = |method: Method| -> Result<Footprint, Failure> {
+            let size = if rays_alone(method) {
+                PatchSize::Objects
+            } else {
+                PatchSize::Whole
+            };
+            let patches = Patches::count(world.surfaces(), world.bvh(), size, usize::MAX)?;
+            let factors = method.factors(self.rays, self.resolution, RAYS);
+            // Values and their errors are printed in rows.
+            let printed = 4 * Dense::bytes_for(scene.objects.len());
+            Ok(Footprint::of(world)
+                .with("form factors", dense::bytes_for(patches, factors, None))
+                .with("the result", printed)
+                .with("patches", Patches::bytes_for(patches, scene)))
+        };
+        footprint(self.method)?.require(context, || {
+            let limit = context.common.max_memory;
+            let smaller = footprint(Method::Raycast).is_ok_and(|rays| rays.fits(limit));
+            (smaller && !rays_alone(self.method)).then(|| "--method raycast".to_owned())
+        })
     }
 }
 

@@ -1,7 +1,9 @@
 //! `luxel probe`: light or openness at given points.
 
 use super::exit::{ExitCode, Failure};
+use super::footprint::{Footprint, held_back, larger_error, largest};
 use super::goal::Goal;
+use super::memory;
 use super::refine::refine;
 use super::scene;
 use super::stated::StatedError;
@@ -16,7 +18,7 @@ use crate::progress::Progress;
 use clap::ValueEnum;
 use glam::DVec3;
 use luxel_scenes::{Rgb, UnitSystem};
-use luxel_solver::adaptive::{self, AdaptiveConfig, Budget, ROW_RAYS};
+use luxel_solver::adaptive::{self, AdaptiveConfig, Budget, Ending, ROW_RAYS};
 use luxel_solver::gather::{Components, MAX_REPLICATES, finish};
 use luxel_solver::world::{Receiver, World};
 use std::path::PathBuf;
@@ -35,6 +37,9 @@ const AO_RAYS: u32 = 4;
 
 /// Samples of each replicate that a refinement begins with: enough for an estimate of the error.
 const FIRST_SAMPLES: u32 = 16;
+
+/// Memory of a point in a list of JSON values, in bytes: two nodes of a map, two lists, seven values and its text.
+const LISTED: usize = 1600;
 
 /// Fraction of back hits from which a point is reported as lying inside a solid.
 const BURIED: f64 = 0.5;
@@ -135,12 +140,14 @@ impl Probe {
         let context = &session.context;
         let goal = context.common.goal(context.started);
         let goal = self.rays.is_none().then_some(&goal);
+        Footprint::to_prepare(&scene).require(context, || None)?;
         let found = context.common.install(|| {
             let world = World::new(&scene);
+            let held = self.require_memory(&world, table.points().len(), goal, context)?;
             let positions: Vec<DVec3> = table.points().iter().map(|p| p.position).collect();
             let normals: Vec<DVec3> = table.points().iter().map(|p| p.normal).collect();
             let receivers = world.receivers(&positions, &normals);
-            self.estimate(&world, &receivers, goal, context)
+            self.estimate(&world, &receivers, &held, goal, context)
         })??;
         let Some(Found {
             estimates,
@@ -152,8 +159,9 @@ impl Probe {
         };
         let seconds = context.started.elapsed().as_secs_f64();
         context.reporter.note(format_args!(
-            "{} points, {seconds:.2} s; {}",
+            "{} points, {seconds:.2} s{}; {}",
             estimates.len(),
+            memory::peak_in_words(),
             error.summary(goal)
         ));
         let csv = table.to_csv(&estimates)?;
@@ -170,7 +178,7 @@ impl Probe {
                 };
                 estimates.iter().map(value).collect()
             };
-            serde_json::to_string_pretty(&serde_json::json!({
+            let mut json = serde_json::json!({
                 "quantity": super::name(&self.quantity),
                 "unit": self.unit(scene.units),
                 "output": self.output.as_deref().map(|path| path.display().to_string()),
@@ -180,7 +188,9 @@ impl Probe {
                 "error": error.to_json(goal),
                 "budget": budget,
                 "seconds": seconds,
-            }))?
+            });
+            memory::add_peak(&mut json);
+            serde_json::to_string_pretty(&json)?
         } else if let Some(path) = &self.output {
             path.display().to_string()
         } else {
@@ -209,10 +219,70 @@ impl Probe {
         Err(Failure::new(ExitCode::Usage, problem))
     }
 
+    /// What the command holds with so many points, without a mesh; `listed` where they are printed as JSON.
+    fn footprint(&self, world: &World<'_>, points: usize, listed: bool) -> Footprint {
+        let gathered = if self.gathers() {
+            adaptive::bytes_to_gather(points)
+        } else {
+            Film::bytes_to_refine(points)
+        };
+        let table = PointTable::bytes_for(points) + usize::from(listed) * points * LISTED;
+        Footprint::of(world)
+            .with("the table of points", table)
+            .with("what is gathered at them", gathered)
+    }
+
+    /// Whether a solution is gathered from, or direct light alone.
+    fn gathers(&self) -> bool {
+        self.quantity == Quantity::Irradiance && self.integrator != Some(Method::Path)
+    }
+
+    /// Patches of the mesh that is begun with, for an error or the fixed number of rays.
+    fn first_patches(&self, error: f64, rays: Option<u32>) -> usize {
+        match rays {
+            _ if !self.gathers() || self.components == Some(Component::Direct) => 0,
+            Some(rays) => patches_for(rays),
+            None => adaptive::first_patches(error),
+        }
+    }
+
+    /// Refuses what would not fit into memory and says what would. Returns what else is held when patches are solved.
+    fn require_memory(
+        &self,
+        world: &World<'_>,
+        points: usize,
+        goal: Option<&Goal>,
+        context: &Context<'_>,
+    ) -> Result<Footprint, Failure> {
+        let listed = context.common.json && self.output.is_none();
+        let with_mesh = |points: usize, patches: usize| {
+            let solving = adaptive::bytes_to_solve(patches, world.scene());
+            let solving = if patches > 0 { solving } else { 0 };
+            self.footprint(world, points, listed)
+                .with("patches and their solutions", solving)
+        };
+        let fits = |points, patches| with_mesh(points, patches).fits(context.common.max_memory);
+        let error = first_error(goal);
+        let first = self.first_patches(error, self.rays);
+        with_mesh(points, first).require(context, || {
+            if let Some(fewer) = largest(1, points - 1, |points| fits(points, first)) {
+                return Some(format!("a table of {fewer} points"));
+            }
+            if let Some(rays) = self.rays {
+                let patches = |rays: usize| self.first_patches(error, Some(rays as u32));
+                let rays = largest(4, rays as usize, |rays| fits(points, patches(rays)))?;
+                return Some(format!("--rays {rays}"));
+            }
+            larger_error(error, |error| fits(points, self.first_patches(error, None)))
+        })?;
+        Ok(self.footprint(world, points, listed))
+    }
+
     fn estimate(
         &self,
         world: &World<'_>,
         receivers: &[Receiver],
+        held: &Footprint,
         goal: Option<&Goal>,
         context: &Context<'_>,
     ) -> Result<Option<Found>, Failure> {
@@ -240,7 +310,7 @@ impl Probe {
                 };
                 Ok(self.sample(receivers.len(), 1, goal, context, add))
             }
-            Method::Gather => self.gather(world, receivers, components, goal, context),
+            Method::Gather => self.gather(world, receivers, components, held, goal, context),
         }
     }
 
@@ -284,21 +354,24 @@ impl Probe {
         world: &World<'_>,
         receivers: &[Receiver],
         components: Components,
+        held: &Footprint,
         goal: Option<&Goal>,
         context: &Context<'_>,
     ) -> Result<Option<Found>, Failure> {
         let mut steering = Steering::new(context, goal);
+        let error = first_error(goal);
+        let first = self.first_patches(error, self.rays);
         let config = AdaptiveConfig {
-            error: first_error(goal),
+            error,
             components,
+            most_patches: held.most_patches(world.scene(), first, context),
             seed: context.common.seed,
         };
         let found = match self.rays {
             None => adaptive::irradiance(world, receivers, &config, &mut steering)?,
             Some(rays) => {
-                let patches = PATCHES * (f64::from(rays) / 1024.0).sqrt();
                 let has_sky = world.lights().has_sky();
-                let budget = Budget::of_rays(patches as usize, rays as usize, has_sky);
+                let budget = Budget::of_rays(patches_for(rays), rays as usize, has_sky);
                 adaptive::irradiance_for(world, receivers, &budget, &config, &mut steering)?
             }
         };
@@ -327,9 +400,13 @@ impl Probe {
             0.0
         };
         let budget = found.budget;
+        let error = StatedError::of_gather(&found.parts, solver);
+        if found.ending == Ending::TooManyPatches && error.exit(goal) == ExitCode::TargetMissed {
+            held_back(context);
+        }
         Ok(Some(Found {
             estimates,
-            error: StatedError::of_gather(&found.parts, solver),
+            error,
             budget: serde_json::json!({
                 "patches": found.patches,
                 "row_rays": ROW_RAYS * MAX_REPLICATES,
@@ -347,6 +424,11 @@ impl Probe {
             (Quantity::Irradiance, UnitSystem::Photometric) => "lx",
         }
     }
+}
+
+/// Patches of the solution for a fixed number of rays a point.
+fn patches_for(rays: u32) -> usize {
+    (PATCHES * (f64::from(rays) / 1024.0).sqrt()) as usize
 }
 
 /// What was found at the points.

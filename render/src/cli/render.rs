@@ -1,9 +1,12 @@
 //! `luxel render`: a picture.
 
+mod footprint;
 mod prepare;
 
 use super::exit::{ExitCode, Failure};
+use super::footprint::{Footprint, held_back};
 use super::goal::Goal;
+use super::memory;
 use super::refine::refine;
 use super::scene;
 use super::stated::StatedError;
@@ -137,8 +140,10 @@ impl Render {
         let goal = context.common.goal(context.started);
         let goal = self.spp.is_none().then_some(&goal);
 
+        Footprint::to_prepare(&scene).require(context, || None)?;
         let exposed = context.common.install(|| {
             let world = World::new(&scene);
+            self.require_memory(&world, &frame, goal, context)?;
             if self.integrator != Method::Ao {
                 scene::require_light(&world)?;
             }
@@ -232,20 +237,23 @@ impl Render {
                     let view = RadiosityView::new(world, &fine.patches, &fine.solutions)
                         .with_coarse(&coarse.patches, &coarse.solutions);
                     let shown = show(&view, fine.solver_bound() / PI);
-                    if !needs_finer(shown.as_ref(), goal, patches, context) {
+                    if !needs_finer(shown.as_ref(), goal, patches, context)
+                        || !self.may_be_finer(world, frame, goal, FINER * patches, context)
+                    {
                         return Ok(shown);
                     }
                     patches *= FINER;
                 }
             }
             Method::Gather | Method::Whitted => {
+                let most_patches = self.most_patches(world, frame, goal, context);
                 let Some(Prepared {
                     scene,
                     mut lookup,
                     mut patches,
                     config,
                     field_error,
-                }) = prepare(world, frame, goal, context)?
+                }) = prepare(world, frame, most_patches, goal, context)?
                 else {
                     return Ok(None);
                 };
@@ -273,6 +281,10 @@ impl Render {
                         show(&Whitted::new(world, Some(gatherer), config), solver_bound)
                     };
                     if !needs_finer(shown.as_ref(), goal, patches, context) {
+                        return Ok(shown);
+                    }
+                    if FINER * patches > most_patches {
+                        held_back(context);
                         return Ok(shown);
                     }
                     patches *= FINER;
@@ -336,12 +348,13 @@ impl Render {
         let seconds = session.context.started.elapsed().as_secs_f64();
         let stated = error.map_or(String::new(), |error| format!("; {}", error.summary(goal)));
         session.context.reporter.note(format_args!(
-            "{width}x{height} pixels, {} samples each, {seconds:.2} s{stated}",
-            in_words(samples)
+            "{width}x{height} pixels, {} samples each, {seconds:.2} s{}{stated}",
+            in_words(samples),
+            memory::peak_in_words()
         ));
         let path = |path: &Path| path.display().to_string();
         let text = if session.context.common.json {
-            serde_json::to_string_pretty(&serde_json::json!({
+            let mut json = serde_json::json!({
                 "output": path(&self.output),
                 "png": self.png.as_deref().map(path),
                 "integrator": super::name(&self.integrator),
@@ -349,7 +362,9 @@ impl Render {
                 "samples": samples,
                 "error": error.map(|error| error.to_json(goal)),
                 "seconds": seconds,
-            }))?
+            });
+            memory::add_peak(&mut json);
+            serde_json::to_string_pretty(&json)?
         } else {
             let paths = [Some(&self.output), self.png.as_ref()];
             let lines: Vec<_> = paths.into_iter().flatten().map(|p| path(p)).collect();

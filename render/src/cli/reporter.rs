@@ -223,6 +223,7 @@ mod tests {
             seed: 0,
             error: None,
             time: None,
+            max_memory: None,
             jobs: None,
             progress,
             json: false,

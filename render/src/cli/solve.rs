@@ -1,13 +1,16 @@
 //! `luxel solve`: radiosity by object, convergence, and where the light goes.
 
 mod budget;
+mod footprint;
 mod report;
 mod rows;
 
 use super::dense::{self, DenseSolution, Solver};
 use super::exit::{ExitCode, Failure};
+use super::footprint::Footprint;
 use super::form_factors::Method;
 use super::goal::Goal;
+use super::memory;
 use super::scene;
 use super::{Context, Session};
 use crate::accuracy::{Accuracy, Part};
@@ -86,6 +89,7 @@ impl Solve {
         let loaded = started.elapsed().as_secs_f64();
         let context = &session.context;
         let goal = context.common.goal(started);
+        Footprint::to_prepare(&scene).require(context, || None)?;
         let mut report = context.common.install(|| {
             let world = World::new(&scene);
             scene::require_light(&world)?;
@@ -115,7 +119,9 @@ impl Solve {
             ));
         }
         let text = if session.context.common.json {
-            serde_json::to_string_pretty(&report.to_json(self.output.as_deref()))?
+            let mut json = report.to_json(self.output.as_deref());
+            memory::add_peak(&mut json);
+            serde_json::to_string_pretty(&json)?
         } else {
             report.to_table()
         };
@@ -145,7 +151,9 @@ impl Solve {
             rays,
             tolerance: self.tolerance,
             goal,
+            writes: self.output.is_some(),
         };
+        task.require_memory(world, context)?;
         let solved = task.run(world, context)?;
         let solve_seconds = started.elapsed().as_secs_f64();
         let Solved {
@@ -209,6 +217,7 @@ impl Solve {
         let started = Instant::now();
         let factors = method.factors(self.rays, self.resolution, RAYS);
         let size = self.patch_size.unwrap_or(PatchSize::Count(DENSE_PATCHES));
+        self.require_dense_memory(world, size, method, context)?;
         let patches = world.mesh(size)?;
         let solver = self.solver.unwrap_or(Solver::GaussSeidel);
         let config = dense::config(self.tolerance);

@@ -2,10 +2,12 @@
 
 use super::Context;
 use super::exit::Failure;
+use crate::integrators::radiosity::RadiosityView;
 use crate::progress::Progress;
+use luxel_scenes::Scene;
 use luxel_solver::gather::MAX_REPLICATES;
 use luxel_solver::patches::{PatchSize, Patches};
-use luxel_solver::radiosity::{RadiosityConfig, RadiositySolution, solve};
+use luxel_solver::radiosity::{RadiosityConfig, RadiositySolution, bytes_to_solve, solve};
 use luxel_solver::solvers::{Config, Tolerance};
 use luxel_solver::world::World;
 
@@ -66,6 +68,19 @@ impl Transport {
             solutions[0].iterations
         ));
         Ok(Self { patches, solutions })
+    }
+
+    /// Memory while about so many patches and a quarter of them are solved and made continuous, in bytes.
+    pub(super) fn bytes_to_view(patches: usize, scene: &Scene) -> usize {
+        let solved = |patches: usize| {
+            Patches::bytes_for(patches, scene)
+                + SOLUTIONS as usize * RadiositySolution::bytes_for(patches, false)
+        };
+        let shown = |patches: usize| RadiosityView::bytes_for(patches, SOLUTIONS as usize);
+        let fine = patches + patches / 10;
+        let coarse = fine / 4;
+        let work = bytes_to_solve(fine, VIEW_ROW_RAYS, false).max(shown(fine) + shown(coarse));
+        solved(fine) + solved(coarse) + work
     }
 
     /// Bound on what the iteration leaves of any irradiance, in W/m².

@@ -44,6 +44,14 @@ pub struct Picture {
     pub origin: Option<Origin>,
 }
 
+impl Picture {
+    /// Memory of a picture of so many pixels and so many layers besides, in bytes, while it is encoded: its values, as
+    /// channels again, and as the file, which compression makes no larger.
+    pub fn bytes_for(pixels: usize, layers: usize) -> usize {
+        3 * pixels * (1 + layers) * size_of::<[f32; 3]>()
+    }
+}
+
 /// Why an EXR file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadExrError {

@@ -52,6 +52,12 @@ impl<'w> RadiosityView<'w> {
         }
     }
 
+    /// Memory of a view of so many patches and solutions, in bytes, while it is made.
+    pub fn bytes_for(patches: usize, solutions: usize) -> usize {
+        // About as many vertices as patches.
+        Display::bytes_for(patches) + 2 * patches * solutions * size_of::<Rgb>()
+    }
+
     /// Adds a coarser mesh with solutions of its own, for the error that patches make.
     ///
     /// # Panics

@@ -65,6 +65,14 @@ pub(super) fn measure(
             };
             break;
         }
+        let bytes = family.bytes(step, setup.target.len(), setup.world.scene());
+        if setup.memory.is_some_and(|memory| bytes > memory) {
+            result.stopped = format!(
+                "The next size would take about {} MiB of memory, more than there may be.",
+                bytes.div_ceil(1 << 20)
+            );
+            break;
+        }
         let started = Instant::now();
         if let Err(reason) = one_step(setup, family, step, &mut result, &mut kept) {
             result.stopped = if step == 0 {

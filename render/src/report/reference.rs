@@ -20,7 +20,7 @@ use std::time::Instant;
 
 /// Points at which methods are compared when none are given: the error of an nRMSE over 256 independent
 /// points of three channels is about 5 % of itself.
-const POINTS: usize = 256;
+pub const POINTS: usize = 256;
 
 /// Independent repetitions of luxel's own reference, which make its standard errors certain to 18 %.
 const REPLICATES: usize = 16;

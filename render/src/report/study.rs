@@ -144,6 +144,8 @@ pub struct Setup<'a, 'w> {
     pub camera: Option<&'a Camera>,
     /// How much is measured.
     pub budget: Budget,
+    /// Memory that a size may take, in bytes, if there is a limit.
+    pub memory: Option<usize>,
     /// Seed of all randomness.
     pub seed: u64,
     /// When the work began.

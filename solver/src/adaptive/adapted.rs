@@ -114,6 +114,7 @@ impl<'w, 's> Adapted<'w, 's> {
     ) -> Result<Option<(Lookup, Budget)>, PilotError> {
         let error = config.error / SAFETY;
         let mut pilot = first_budget(self.world, error, sample.len().min(PILOT_RECEIVERS));
+        pilot.patches = pilot.patches.min(config.most_patches);
         let share = sample.len().div_ceil(PILOT_RECEIVERS).max(1);
         let sample: Vec<Receiver> = sample.iter().copied().step_by(share).collect();
         loop {
@@ -143,11 +144,12 @@ impl<'w, 's> Adapted<'w, 's> {
                 has_sky,
             };
             let planned = spent.plan(error, count, Changes::All).budget;
-            if planned.patches as f64 <= WORTHWHILE * pilot.patches as f64 {
+            let finer = planned.patches.min(config.most_patches);
+            if finer as f64 <= WORTHWHILE * pilot.patches as f64 {
                 let patches = pilot.patches;
                 return Ok(Some((lookup, Budget { patches, ..planned })));
             }
-            pilot.patches = planned.patches.min(MESH_GROWTH * pilot.patches);
+            pilot.patches = finer.min(MESH_GROWTH * pilot.patches);
         }
     }
 }

@@ -21,11 +21,13 @@ mod adapted;
 mod budget;
 mod gathering;
 mod indirect_field;
+mod memory;
 mod penumbrae;
 
 pub use adapted::Adapted;
 pub use budget::{Budget, Changes, ROW_RAYS, fewest_rays};
 pub use indirect_field::FieldGather;
+pub use memory::{bytes_to_gather, bytes_to_refine, bytes_to_solve, first_patches};
 
 use crate::gather::{Components, ErrorParts, Tally};
 use crate::pilot::PilotError;
@@ -100,6 +102,8 @@ pub enum Ending {
     Stopped,
     /// More rays or patches than there may be would be needed.
     OutOfReach,
+    /// More patches than [`AdaptiveConfig::most_patches`] would be needed.
+    TooManyPatches,
 }
 
 /// What is asked for.
@@ -109,6 +113,9 @@ pub struct AdaptiveConfig {
     pub error: f64,
     /// Which light.
     pub components: Components,
+    /// Patches that no mesh may be asked to have more of, for want of memory: rays make up for the mesh
+    /// as far as they can.
+    pub most_patches: usize,
     /// Seed of all random numbers.
     pub seed: u64,
 }
@@ -166,12 +173,15 @@ pub fn irradiance(
     }
     let mut result = Adaptive::none();
     let mut shadow_rounds = gathering.evenly(budget.shadow_rays);
+    let mut is_held_back = false;
     for _ in 0..MAX_ROUNDS {
         let (stage, rays) = (Stage::Gathering, budget.rays);
         gathering.spent.patches = budget.patches;
         if !gathering.go_on(lookup.as_ref(), rays, shadow_rounds, stage, control) {
             return Ok(result);
         }
+        // What the last round made is not needed any more: many receivers would be held three times.
+        drop(result);
         result = gathering.state(lookup.as_ref());
         if control.suits(&result.parts) {
             result.ending = Ending::Reached;
@@ -194,10 +204,19 @@ pub fn irradiance(
         let mut solved = None;
         if let Some(scene) = adapted.as_ref().filter(|_| fixed > MESH_SHARE * error) {
             let free = spent.plan(error, count, Changes::All);
-            if free.budget.patches > budget.patches {
-                let worthwhile = (WORTHWHILE * budget.patches as f64) as usize;
+            let worthwhile = (WORTHWHILE * budget.patches as f64) as usize;
+            let grows = free.budget.patches > budget.patches;
+            if grows && worthwhile > config.most_patches {
+                is_held_back = true;
+                // What the mesh leaves is too much by itself.
+                if fixed >= error {
+                    result.ending = Ending::TooManyPatches;
+                    return Ok(result);
+                }
+            } else if grows {
+                let patches = free.budget.patches.max(worthwhile);
                 next = free;
-                next.budget.patches = next.budget.patches.max(worthwhile);
+                next.budget.patches = patches.min(config.most_patches);
                 solved = scene.solve(next.budget.patches, control)?;
             }
         }
@@ -208,15 +227,18 @@ pub fn irradiance(
         };
         shadow_rounds = spent.penumbrae.due(&next.shadow_rays);
         if budget.rays == before && solved.is_none() && shadow_rounds.is_empty() {
-            result.ending = Ending::OutOfReach;
-            return Ok(result);
+            break;
         }
         if solved.is_some() {
             lookup = solved;
             gathering = gathering.with_direct_alone();
         }
     }
-    result.ending = Ending::OutOfReach;
+    result.ending = if is_held_back {
+        Ending::TooManyPatches
+    } else {
+        Ending::OutOfReach
+    };
     Ok(result)
 }
 

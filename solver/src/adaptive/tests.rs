@@ -47,6 +47,7 @@ fn run(error: f64, left: usize) -> (Adaptive, usize) {
     let config = AdaptiveConfig {
         error,
         components: Components::All,
+        most_patches: usize::MAX,
         seed: 1,
     };
     let mut control = Counted {
@@ -123,6 +124,7 @@ fn many_receivers_share_few_rays_and_are_right() {
         let config = AdaptiveConfig {
             error,
             components: Components::All,
+            most_patches: usize::MAX,
             seed,
         };
         let found = irradiance(&world, receivers, &config, &mut unlimited(error));
@@ -201,6 +203,7 @@ fn joined_receivers_are_the_same_at_any_number_of_threads() {
     let config = AdaptiveConfig {
         error: 0.1,
         components: Components::All,
+        most_patches: usize::MAX,
         seed: 4,
     };
     let with = |threads: usize| {
@@ -211,4 +214,24 @@ fn joined_receivers_are_the_same_at_any_number_of_threads() {
     };
     let (one, three) = (with(1), with(3));
     assert!(!one.is_empty() && one == three);
+}
+
+/// A mesh that may not be refined is told apart from what no budget reaches: the mesh alone leaves more than 0.05 %, and
+/// no ray is cast in vain.
+#[test]
+fn a_mesh_that_may_not_grow_is_the_reason() {
+    let scene = generate::cornell_box();
+    let world = World::new(&scene);
+    let receivers = on_the_floor(&world, 6);
+    let config = AdaptiveConfig {
+        error: 0.0005,
+        components: Components::All,
+        most_patches: 400,
+        seed: 1,
+    };
+    let result = irradiance(&world, &receivers, &config, &mut unlimited(0.0005)).expect("a scene");
+    assert_eq!(result.ending, Ending::TooManyPatches);
+    // The mesher stops within a tenth of the number asked for, where faces allow.
+    assert!(result.budget.patches <= 400 && result.patches <= 480);
+    assert_eq!(result.tallies.len(), receivers.len());
 }

@@ -16,6 +16,7 @@ use crate::sampling::{Stage, hash};
 use glam::{Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use rayon::prelude::*;
 
@@ -39,6 +40,13 @@ const PADDING: f32 = 16.0 / 16_777_216.0;
 
 /// Level below the root where the tree is cut for work in parallel. The result does not depend on it.
 const CUT: usize = 9;
+
+/// Memory while a tree is built, at most, for each triangle: its box twice, two nodes of obvhs and what PLOC sorts
+/// and merges them with, two nodes in order with their copies in subtrees.
+pub(super) const BYTES_A_TRIANGLE: usize = size_of::<(Bounds, Aabb, u32)>()
+    + 2 * size_of::<[Bvh2Node; 2]>()
+    + size_of::<[u64; 4]>()
+    + 2 * size_of::<[(Content, Bounds, u32); 2]>();
 
 /// A box in f32.
 #[derive(Clone, Copy, Debug)]

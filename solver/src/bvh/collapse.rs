@@ -11,6 +11,7 @@
 use super::build::{Binary, Content};
 use super::node::{BLOCK, Block, Child, Node, WIDTH};
 use crate::geometry::{Geometry, TriangleId};
+use crate::memory::held;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -24,6 +25,11 @@ const CUT: usize = 3;
 /// the tree: with 12 triangles 2.7 to 4.6 times as fast, with 38 1.1 (shadow rays) to 2.1 times. With more
 /// the tree wins, first for shadow rays; with less, rooms of boxes lose what this gains.
 pub(super) const FEW: usize = 48;
+
+/// Memory while a tree is collapsed, at most, for each triangle: plans of two nodes, and the wide tree twice, in parts
+/// and strung together. A block holds three triangles or more on average, a node of the wide tree seven children.
+pub(super) const BYTES_A_TRIANGLE: usize = size_of::<[Plan; 2]>()
+    + 2 * (size_of::<Block>() / 3 + size_of::<Node>() / 18 + size_of::<TriangleId>());
 
 /// The wide tree.
 pub(super) struct Wide {
@@ -95,6 +101,11 @@ pub(super) fn collapse(binary: &Binary, geometry: &Geometry) -> Wide {
 }
 
 impl Wide {
+    /// Memory that it holds, in bytes.
+    pub(super) fn bytes(&self) -> usize {
+        held(&self.nodes) + held(&self.blocks) + held(&self.leaf_order)
+    }
+
     /// A node without children.
     fn empty() -> Self {
         Self {

@@ -46,6 +46,17 @@ impl Bvh {
         Self { wide }
     }
 
+    /// Memory that it holds, in bytes.
+    pub fn bytes(&self) -> usize {
+        self.wide.as_ref().map_or(0, Wide::bytes)
+    }
+
+    /// Memory that the tree of so many triangles takes while it is built, in bytes: the tree itself, the binary
+    /// one that it is made from, and that of obvhs.
+    pub fn bytes_to_build(triangles: usize) -> usize {
+        triangles * (build::BYTES_A_TRIANGLE + collapse::BYTES_A_TRIANGLE)
+    }
+
     /// The first hit of each ray, or [`Hit::MISS`]. Both sides of faces are hit; of faces at the
     /// same distance the triangle of lowest id counts.
     ///

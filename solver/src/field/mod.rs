@@ -20,7 +20,7 @@ mod planes;
 mod polynomial;
 
 use crate::world::Receiver;
-use dyadic::{Excess, Point, Tree};
+use dyadic::{Excess, Leaf, Point, Tree};
 use glam::DVec3;
 use planes::Planes;
 use polynomial::{Factor, Sums, TERMS};
@@ -42,6 +42,10 @@ const BIAS_SPREAD: f64 = 0.5;
 
 /// The largest that is believed: more is of outliers.
 const LARGEST_BIAS: f64 = 3.0;
+
+/// Receivers to a coefficient in each set of cells, about, where noise is small and cells are too: what memory is
+/// expected follows from it. Measured on tables of 100 000 points to 1.5 %.
+const POINTS_A_COEFFICIENT: usize = 16;
 
 /// A value at a receiver, by which cells are chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,6 +92,13 @@ impl Cells {
             })
             .collect();
         Self { planes, trees }
+    }
+
+    /// Memory of the cells of so many receivers and of fields of so many columns in them, in bytes, while they are made.
+    pub fn bytes_for(receivers: usize, columns: usize) -> usize {
+        let points = (SHIFTS.len() + 1) * size_of::<Point>() + size_of::<(u32, [f64; 3])>();
+        let leaf = size_of::<Leaf>() + 2 * columns * size_of::<f64>();
+        receivers * (size_of::<Value>() + points + SHIFTS.len() * leaf / POINTS_A_COEFFICIENT)
     }
 
     /// By what factor standard deviations of joined values are to be widened, so that they hold the bias:

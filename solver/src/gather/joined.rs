@@ -61,7 +61,7 @@ fn widened(values: &[Rgb; MAX_REPLICATES], count: u8, widening: f64) -> [Rgb; MA
 
 /// Columns of the light of gather rays: for each replicate light found and indirect by gather, light and
 /// difference by solution; and the squares.
-const COLUMNS: usize = 3 * (4 * MAX_REPLICATES + 1);
+pub(crate) const COLUMNS: usize = 3 * (4 * MAX_REPLICATES + 1);
 
 fn write(tally: &Tally, widening: f64, row: &mut [f64]) {
     let found = widened(&tally.found, tally.gathers, widening);
@@ -135,6 +135,11 @@ pub struct IndirectField(Field);
 const OF_REPLICATE: usize = 9;
 
 impl IndirectField {
+    /// Memory of a field of so many receivers, and of what it is made from, in bytes.
+    pub fn bytes_for(receivers: usize) -> usize {
+        Cells::bytes_for(receivers, OF_REPLICATE * MAX_REPLICATES)
+    }
+
     /// Joins the light that gather rays found at receivers. Replicate r of the field is that of gather r and
     /// of solution r, so that the scatter of its replicates tells the noise of both.
     ///

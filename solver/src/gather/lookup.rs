@@ -11,7 +11,7 @@ use crate::geometry::TriangleId;
 use crate::patches::{PatchId, Patches, Side};
 use crate::radiosity::{Class, RadiositySolution, unknown};
 use glam::{DVec3, Vec3};
-use luxel_scenes::Rgb;
+use luxel_scenes::{Rgb, Scene};
 use std::ops::Range;
 
 /// Largest number of independent solutions (and of independent gathers).
@@ -67,6 +67,15 @@ impl Lookup {
         assert_eq!(solutions.len(), self.solutions, "as many solutions as fine");
         self.coarse = Some(Table::new(patches, solutions));
         self
+    }
+
+    /// Memory of so many solutions on so many patches, and on a quarter as many, in bytes.
+    pub fn bytes_for(patches: usize, solutions: usize, scene: &Scene) -> usize {
+        let table = |patches: usize| {
+            Patches::bytes_for(patches, scene)
+                + patches * Class::COUNT * solutions * size_of::<Vec3>()
+        };
+        table(patches) + table(patches / 4)
     }
 
     /// The mesh that is looked up.

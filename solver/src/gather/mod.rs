@@ -24,6 +24,7 @@ mod near_chain;
 mod tally;
 
 pub use error_parts::{ErrorParts, error_parts};
+pub(crate) use joined::COLUMNS as JOINED_COLUMNS;
 pub use joined::{IndirectField, joined};
 pub use lookup::{Lookup, MAX_REPLICATES, Solutions};
 pub(crate) use tally::SHADOW_EXPONENT;

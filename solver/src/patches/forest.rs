@@ -6,6 +6,7 @@
 //! R. A. Finkel, J. L. Bentley, "Quad Trees: A Data Structure for Retrieval on Composite Keys",
 //! Acta Informatica 4, 1974. Cost of a lookup: one step a level.
 
+use crate::memory::held;
 use std::collections::HashSet;
 
 /// Levels below a root that a leaf can lie on: a path holds two bits for each.
@@ -13,6 +14,9 @@ pub(super) const MAX_LEVEL: u8 = 16;
 
 /// Marks a node that is a leaf.
 const LEAF: u32 = 1 << 31;
+
+/// Memory of a leaf with its share of the nodes above: four children have one parent.
+pub(super) const BYTES_A_LEAF: usize = size_of::<Node>() + 4 * size_of::<u32>() / 3;
 
 /// A node of a forest: its root and the way to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -130,6 +134,11 @@ impl Forest {
             }
         }
         Self::grow(self.roots, |node| divided.contains(&node))
+    }
+
+    /// Memory of its arrays in bytes.
+    pub(super) fn bytes(&self) -> usize {
+        held(&self.nodes) + held(&self.leaves)
     }
 
     /// Number of elements.

@@ -69,24 +69,43 @@ impl Patches {
     /// # Errors
     /// [`MeshError`] when the size is not a positive number or makes too many patches.
     pub fn mesh(surfaces: &Surfaces, bvh: &Bvh, size: PatchSize) -> Result<Self, MeshError> {
-        let mesher = Mesher::new(surfaces, bvh, None);
-        let regions = match size {
-            PatchSize::Whole => (0..mesher.areas.len())
-                .map(|i| single(vec![FaceId::new(i)], &mesher.areas))
-                .collect(),
-            PatchSize::Objects => objects(surfaces, &mesher.areas),
-            PatchSize::Length(length) => {
-                if !(length > 0.0 && length.is_finite()) {
-                    return Err(MeshError::Size(length));
-                }
-                mesher.divide(length / surfaces.geometry().frame().metres_per_unit)?
-            }
-            PatchSize::Count(count) => mesher.divide_into(count)?,
-        };
+        let regions = Mesher::new(surfaces, bvh, None).regions(size)?;
         if size == PatchSize::Objects {
             return Ok(assemble(surfaces, regions, true));
         }
         Ok(separated(surfaces, bvh, regions))
+    }
+
+    /// Number of patches that [`Patches::mesh`] will make, before walls divide any. Where the area alone makes more
+    /// than `enough`, that number, without a mesh.
+    ///
+    /// # Errors
+    /// As [`Patches::mesh`].
+    pub fn count(
+        surfaces: &Surfaces,
+        bvh: &Bvh,
+        size: PatchSize,
+        enough: usize,
+    ) -> Result<usize, MeshError> {
+        let mesher = Mesher::new(surfaces, bvh, None);
+        let by_area = match size {
+            PatchSize::Count(count) => count,
+            PatchSize::Length(length) => {
+                let unit = surfaces.geometry().frame().metres_per_unit;
+                // Rounding leaves half of a patch where it is a face.
+                (0.5 * mesher.total * (unit / length).powi(2)) as usize
+            }
+            PatchSize::Whole | PatchSize::Objects => 0,
+        };
+        if by_area > enough {
+            return Ok(by_area);
+        }
+        let regions = mesher.regions(size)?;
+        let count = |region: &Region| {
+            let both = size != PatchSize::Objects && is_two_sided(surfaces, region);
+            region.element_count() as usize * (1 + usize::from(both))
+        };
+        Ok(regions.iter().map(count).sum())
     }
 
     /// Meshes a scene into about `count` patches, as finely in each place as `density` says: from
@@ -208,6 +227,23 @@ impl<'m, 's> Mesher<'m, 's> {
             areas,
             total,
             density,
+        }
+    }
+
+    /// The regions of a mesh.
+    fn regions(&self, size: PatchSize) -> Result<Vec<Region>, MeshError> {
+        match size {
+            PatchSize::Whole => Ok((0..self.areas.len())
+                .map(|i| single(vec![FaceId::new(i)], &self.areas))
+                .collect()),
+            PatchSize::Objects => Ok(objects(self.surfaces, &self.areas)),
+            PatchSize::Length(length) => {
+                if !(length > 0.0 && length.is_finite()) {
+                    return Err(MeshError::Size(length));
+                }
+                self.divide(length / self.surfaces.geometry().frame().metres_per_unit)
+            }
+            PatchSize::Count(count) => self.divide_into(count),
         }
     }
 
@@ -364,6 +400,10 @@ fn region(shape: Shape, faces: Vec<FaceId>) -> Region {
     }
 }
 
+fn is_two_sided(surfaces: &Surfaces, region: &Region) -> bool {
+    surfaces.material(region.faces[0]).sidedness == Sidedness::Both
+}
+
 /// One patch of whole faces.
 fn single(members: Vec<FaceId>, areas: &[f64]) -> Region {
     let total: f64 = members.iter().map(|face| areas[face.index()]).sum();
@@ -404,8 +444,7 @@ fn assemble(surfaces: &Surfaces, mut regions: Vec<Region>, fronts_only: bool) ->
         {
             triangle_region[triangle.index()] = index as u32;
         }
-        let two_sided =
-            !fronts_only && surfaces.material(region.faces[0]).sidedness == Sidedness::Both;
+        let two_sided = !fronts_only && is_two_sided(surfaces, region);
         region.first = patches.area.len() as u32;
         let count = region.element_count();
         region.first_back = two_sided.then_some(region.first + count);

@@ -27,9 +27,10 @@ pub use density::Density;
 pub use mesh::{MAX_PATCHES, MeshError, PatchSize};
 pub use region::SurfaceSample;
 
-use crate::geometry::{Geometry, TriangleId};
+use crate::geometry::{Geometry, TriangleId, triangle_count};
+use crate::memory::held;
 use glam::DVec3;
-use luxel_scenes::{Exitance, FaceId, Reflectance};
+use luxel_scenes::{Exitance, FaceId, Reflectance, Scene};
 use region::Region;
 
 /// Index of a patch in [`Patches`].
@@ -85,6 +86,29 @@ impl Patches {
     /// True when the scene has no faces.
     pub fn is_empty(&self) -> bool {
         self.area.is_empty()
+    }
+
+    /// Memory that it holds, in bytes.
+    pub fn bytes(&self) -> usize {
+        let regions = self.regions.iter().map(Region::bytes);
+        held(&self.regions)
+            + regions.sum::<usize>()
+            + held(&self.triangle_region)
+            + held(&self.patch_region)
+            + held(&self.area)
+            + held(&self.size)
+            + held(&self.reflectance)
+            + held(&self.emission)
+    }
+
+    /// Memory that so many patches of a scene take, in bytes, in quadtrees where they follow a density. Walls
+    /// that divide patches are not known before they are found.
+    pub fn bytes_for(patches: usize, scene: &Scene) -> usize {
+        let faces = scene.faces.len();
+        patches * (size_of::<(f64, Reflectance, Exitance, u32, f32)>() + forest::BYTES_A_LEAF)
+            + triangle_count(scene) * size_of::<u32>()
+            + patches.min(faces) * size_of::<Region>()
+            + faces * size_of::<(f64, FaceId)>()
     }
 
     /// All ids in order.

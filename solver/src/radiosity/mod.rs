@@ -4,10 +4,14 @@
 //! computed apart at the sample points of the patches, so that the system carries reflected light
 //! only: B = ρ (E^direct + F B).
 
+mod memory;
 mod rows;
+
+pub use memory::bytes_to_solve;
 
 use crate::direct::Lights;
 use crate::error;
+use crate::memory::held;
 use crate::patches::{PatchId, Patches};
 use crate::solvers::{self, Config, Ledger, Outcome, System, SystemError};
 use crate::world::World;
@@ -96,6 +100,17 @@ pub struct RadiositySolution {
 }
 
 impl RadiositySolution {
+    /// Memory of the solution of so many patches, in bytes; `against` parents with what they would have given less.
+    pub fn bytes_for(patches: usize, against: bool) -> usize {
+        patches * Class::COUNT * size_of::<(Irradiance, u32)>()
+            + usize::from(against) * patches * size_of::<Irradiance>()
+    }
+
+    /// Memory that its arrays hold, in bytes.
+    pub fn bytes(&self) -> usize {
+        held(&self.irradiance) + held(&self.rays) + held(&self.coarsening)
+    }
+
     /// Irradiance (direct and reflected) of a patch as seen in a class, in W/m².
     pub fn irradiance(&self, patch: PatchId, class: Class) -> Irradiance {
         self.irradiance[unknown(patch, class)]

@@ -17,6 +17,11 @@ pub struct Columns {
 }
 
 impl Columns {
+    /// Memory of the columns of so many unknowns and entries, in bytes.
+    pub fn bytes_for(len: usize, entries: usize) -> usize {
+        len * size_of::<usize>() + entries * size_of::<u32>() + entries * size_of::<f64>()
+    }
+
     /// The columns of an operator.
     pub fn new(transport: &dyn Transport) -> Self {
         let n = transport.len();

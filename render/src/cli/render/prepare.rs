@@ -24,7 +24,7 @@ const GATHER_RAYS: usize = 16;
 const REFINED_GATHER_RAYS: usize = 4;
 
 /// Patches of the solution for a fixed number of samples.
-const GATHER_PATCHES: usize = 6000;
+pub(super) const GATHER_PATCHES: usize = 6000;
 
 /// Pixels that share their gather rays, roughly: what the mesh is planned for.
 const JOINED: usize = 16;
@@ -48,10 +48,11 @@ pub(super) struct Prepared<'w, 's> {
     pub(super) field_error: Option<f64>,
 }
 
-/// Solutions that are good enough for the goal at what the camera sees, and how to gather from them.
+/// Solutions of `most_patches` at most that are good enough for the goal at what the camera sees, and how to gather from them.
 pub(super) fn prepare<'w, 's>(
     world: &'w World<'s>,
     frame: &CameraFrame,
+    most_patches: usize,
     goal: Option<&Goal>,
     context: &Context<'_>,
 ) -> Result<Option<Prepared<'w, 's>>, Failure> {
@@ -77,6 +78,7 @@ pub(super) fn prepare<'w, 's>(
     let wanted = AdaptiveConfig {
         error: first_error(goal),
         components: Components::All,
+        most_patches,
         seed,
     };
     let [width, height] = frame.size();
@@ -97,6 +99,14 @@ pub(super) fn prepare<'w, 's>(
     }))
 }
 
+/// Receivers of the field of a picture of some size, along its sides.
+pub(super) fn receivers([width, height]: [usize; 2]) -> [usize; 2] {
+    let every = ((width * height) as f64 / MOST_RECEIVERS as f64)
+        .sqrt()
+        .max(1.0);
+    [width, height].map(|side| (side as f64 / every).ceil() as usize)
+}
+
 /// Indirect light where the camera sees diffuse faces, as exact as the picture needs it; `None` when it was stopped, or
 /// no light is seen that an error could be relative to.
 pub(super) fn indirect_field(
@@ -107,23 +117,19 @@ pub(super) fn indirect_field(
     error: f64,
     steering: &mut Steering<'_, '_>,
 ) -> Option<IndirectField> {
-    let [width, height] = frame.size();
-    let every = ((width * height) as f64 / MOST_RECEIVERS as f64)
-        .sqrt()
-        .max(1.0);
-    let cells = [width, height].map(|side| (side as f64 / every).ceil() as usize);
+    let cells = receivers(frame.size());
     let mut seen = views(world, frame, cells);
     seen.retain(|vertex| vertex.reflectance().0.max_element() > 0.0);
     let share = seen.len() as f64 / (cells[0] * cells[1]) as f64;
     let weight = |vertex: &Vertex<'_>| vertex.reflectance().0 * (share.sqrt() / PI);
-    let receivers: Vec<Receiver> = seen.iter().map(Vertex::receiver).collect();
+    let places: Vec<Receiver> = seen.iter().map(Vertex::receiver).collect();
     let weights: Vec<Rgb> = seen.iter().map(weight).collect();
     let level = Gatherer::new(world, lookup, config).level(&rays(frame, [GRID; 2]));
     if level <= 0.0 {
         return None;
     }
     let seed = hash::mix64(config.seed ^ FIELD);
-    FieldGather::new(world, lookup, &receivers, seed).until(error * level, &weights, steering)
+    FieldGather::new(world, lookup, &places, seed).until(error * level, &weights, steering)
 }
 
 /// Cells along each side of the grid by which a picture is judged.

@@ -1,6 +1,7 @@
 //! What `solve` prints.
 
 use crate::accuracy::{Part, RelativeErrors};
+use crate::cli::memory;
 use crate::solution::ObjectLight;
 use luxel_scenes::{Radiosity, Rgb};
 use luxel_solver::radiosity::RadiositySolution;
@@ -67,10 +68,11 @@ impl Report {
         let errors = &self.errors;
         let sampling = errors.sampling.map_or("unknown".to_owned(), percent);
         let mut text = format!(
-            "{} patches, {} sweeps, {seconds:.2} s; estimated error {} of the mean irradiance \
+            "{} patches, {} sweeps, {seconds:.2} s{}; estimated error {} of the mean irradiance \
              (sampling {sampling}, discretisation {}, solver {:.1e})",
             self.patches,
             self.iterations,
+            memory::peak_in_words(),
             percent(errors.total()),
             percent(errors.discretisation),
             errors.solver,

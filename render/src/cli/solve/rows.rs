@@ -5,6 +5,7 @@ use super::budget::{Budget, MARGIN};
 use crate::accuracy::{Accuracy, RelativeErrors};
 use crate::cli::Context;
 use crate::cli::exit::Failure;
+use crate::cli::footprint::held_back;
 use crate::cli::goal::Goal;
 use crate::cli::steering::stage;
 use crate::progress::Progress;
@@ -18,10 +19,10 @@ use luxel_solver::world::World;
 use std::time::Instant;
 
 /// Independent solutions, whose scatter is the sampling error.
-const REPLICATES: u64 = 4;
+pub(super) const REPLICATES: u64 = 4;
 
 /// Patches of a mesh whose size is not given, by a fixed budget.
-const PATCHES: usize = 4000;
+pub(super) const PATCHES: usize = 4000;
 
 /// Shadow rays of each sample point of a patch; four measured no better.
 const SHADOW_RAYS: usize = 1;
@@ -34,17 +35,17 @@ const MAX_ITERATIONS: usize = 20_000;
 /// taken from the others, they made the office worse (discretisation 1.0, 1.3 and 2.4 % of the mean
 /// irradiance with none, 30 and 60 % of 4000 patches; cornell 0.15, 0.15, 0.20, corridor 0.33, 0.35,
 /// 0.22 %).
-const SUBDIVIDED: f64 = 0.25;
+pub(super) const SUBDIVIDED: f64 = 0.25;
 
 /// Patches to a parent.
-const COARSENING: usize = 4;
+pub(super) const COARSENING: usize = 4;
 
 /// Patches of a given mesh below which its parents would often be its own patches.
-const FEWEST_WITH_PARENTS: usize = 2000;
+pub(super) const FEWEST_WITH_PARENTS: usize = 2000;
 
 /// Children that such a mesh is held against, and the rays of each.
-const FEWEST_CHILDREN: usize = 1000;
-const CHILD_RAYS: usize = 64;
+pub(super) const FEWEST_CHILDREN: usize = 1000;
+pub(super) const CHILD_RAYS: usize = 64;
 
 /// From the difference that children make to what [`Accuracy`] takes for parents': it counts half of
 /// that as the error, and all of this is.
@@ -60,6 +61,8 @@ pub(super) struct Task<'t> {
     pub(super) tolerance: f64,
     /// When to stop.
     pub(super) goal: &'t Goal,
+    /// Whether a mesh is made of the result.
+    pub(super) writes: bool,
 }
 
 /// A solution with its errors.
@@ -139,10 +142,15 @@ impl Task<'_> {
             }
             let fixed = self.size.is_some();
             let next = self.next(budget, &errors, target, fixed, started);
-            match next {
-                Some(next) => budget = next,
-                None => break,
-            }
+            let Some(next) = next.map(|next| self.within_memory(world, budget, next, context))
+            else {
+                break;
+            };
+            let Some(next) = next else {
+                held_back(context);
+                break;
+            };
+            budget = next;
         }
         best.ok_or_else(Failure::interrupted)
     }
@@ -339,7 +347,7 @@ fn from_children(
 }
 
 /// The first round of a run that only time ends.
-const FIRST_TIMED_ERROR: f64 = 0.02;
+pub(super) const FIRST_TIMED_ERROR: f64 = 0.02;
 
 /// The share of the time left that a round is expected to take.
 const SAFETY: f64 = 0.7;

@@ -166,6 +166,9 @@ pub(super) fn trace<const ANY: bool>(wide: &Wide, rays: &[Ray], answers: &mut An
     let mut slots: [Slot<'_>; WAVE] = memory.stacks().map(Slot::empty);
     let mut queues = Queues::EMPTY;
     let mut next = 0;
+    if ANY {
+        answers.blocked.fill(false);
+    }
     while next < WAVE.min(rays.len()) {
         slots[next] = Slot::new(slots[next].stack, &rays[next], next);
         queues.nodes.push_if(true, next);
@@ -377,7 +380,9 @@ unsafe fn compact_eight(slot: &Slot<'_>, kept: usize, at: usize) -> usize {
     let beyond = _mm256_cmpgt_epi32(_mm256_and_si256(keys, entry), nearest);
     let beyond = _mm256_movemask_ps(_mm256_castsi256_ps(beyond)) as u32;
     let valid = (1u32 << slot.pending.saturating_sub(at).min(8)) - 1;
-    let keep = !beyond & valid;
+    // The bottom ends the ray and always stays: behind a ray that begins before its origin a hit is
+    // nearer than any entry.
+    let keep = (!beyond | u32::from(at == 0)) & valid;
     let order = COMPACTION.order(keep as usize);
     // SAFETY: `kept` is at most `at`. What is overwritten has been read.
     unsafe {

@@ -119,8 +119,9 @@ fn bits(hit: &Hit) -> ([u32; 3], Option<TriangleId>) {
 fn assert_twins(name: &str, bvh: &Bvh, rays: &[Ray]) {
     let mut hits = vec![Hit::MISS; rays.len()];
     let mut twins = hits.clone();
-    let mut blocked = vec![false; rays.len()];
-    let mut twins_blocked = blocked.clone();
+    // What stands there before is no answer.
+    let mut blocked = vec![true; rays.len()];
+    let mut twins_blocked = vec![false; rays.len()];
     bvh.closest_hits_portable(rays, &mut twins);
     bvh.occluded(rays, &mut blocked);
     bvh.occluded_portable(rays, &mut twins_blocked);

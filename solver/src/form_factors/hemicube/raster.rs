@@ -75,6 +75,14 @@ impl Hemicube {
         }
     }
 
+    /// Memory of a hemicube of a resolution, in bytes: the pixels of top and side, and the buffers of a face.
+    pub fn bytes_for(resolution: usize) -> usize {
+        let face = resolution * resolution;
+        face * size_of::<f64>()
+            + face / 2 * size_of::<f64>()
+            + face * (size_of::<f64>() + size_of::<u32>())
+    }
+
     /// Adds `weight` times the form factor from a surface element to each facet that it sees to
     /// `factors`, at the index that the facet names. `angle` in radians turns the cube about the
     /// unit `normal`. What is not added up to `weight` escapes or meets black.

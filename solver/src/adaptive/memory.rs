@@ -1,0 +1,52 @@
+//! What adaptive work holds at its peak, known before it begins.
+//!
+//! Rays come and go in batches: memory follows the patches that are solved and the receivers that are gathered,
+//! and not the number of their rays.
+
+use super::budget::{Budget, JOINED_FROM, ROW_RAYS};
+use super::{SAFETY, WORTHWHILE};
+use crate::field::Cells;
+use crate::gather::{Gathered, JOINED_COLUMNS, Lookup, MAX_REPLICATES, Tally};
+use crate::patches::Patches;
+use crate::radiosity::{self, RadiositySolution};
+use crate::world::Receiver;
+use luxel_scenes::Scene;
+
+/// How many more patches than asked for a mesh may have: the mesher stops within a tenth.
+const OVERSHOOT: f64 = 1.1;
+
+/// Memory while a mesh of about so many patches is solved, and another of a quarter of them, in bytes: both meshes, all
+/// solutions, and the work on the last one.
+pub fn bytes_to_solve(patches: usize, scene: &Scene) -> usize {
+    let fine = (patches as f64 * OVERSHOOT) as usize;
+    let coarse = fine / 4;
+    let solutions = |patches| MAX_REPLICATES * RadiositySolution::bytes_for(patches, false);
+    Patches::bytes_for(fine, scene)
+        + Patches::bytes_for(coarse, scene)
+        + solutions(fine)
+        + solutions(coarse)
+        + radiosity::bytes_to_solve(fine, ROW_RAYS, false)
+}
+
+/// As [`bytes_to_solve`], while coarser solutions are kept that the new ones take the place of: at least
+/// so much finer as is worth a new mesh.
+pub fn bytes_to_refine(patches: usize, scene: &Scene) -> usize {
+    let kept = (patches as f64 * OVERSHOOT / WORTHWHILE) as usize;
+    bytes_to_solve(patches, scene) + Lookup::bytes_for(kept, MAX_REPLICATES, scene)
+}
+
+/// Memory while receivers are gathered, in bytes, the receivers themselves included: what was gathered, what is made of
+/// it, and the cells in which they are joined.
+pub fn bytes_to_gather(receivers: usize) -> usize {
+    let joined = if receivers >= JOINED_FROM {
+        Cells::bytes_for(receivers, JOINED_COLUMNS)
+    } else {
+        0
+    };
+    receivers * (size_of::<Receiver>() + 2 * size_of::<Tally>() + size_of::<Gathered>()) + joined
+}
+
+/// Patches of the first mesh for a relative error.
+pub fn first_patches(error: f64) -> usize {
+    Budget::pilot(error / SAFETY).patches
+}
