@@ -35,7 +35,7 @@ pub(super) struct Planned {
 
 /// What of a budget may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Changes {
+pub(super) enum Changes {
     /// Mesh and rays.
     All,
     /// Rays: those that were gathered in the mesh stay.

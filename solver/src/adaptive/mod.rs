@@ -3,13 +3,14 @@
 //!
 //! 1. A mesh and four solutions are guessed from the error that is asked for ([`Budget::pilot`]).
 //! 2. Some of the receivers are gathered with few rays; the parts of their error
-//!    ([`ErrorParts`]) say what the cheapest sufficient budget is ([`Budget::for_error`]).
+//!    ([`ErrorParts`]) say what the cheapest sufficient budget is (`budget`).
 //! 3. When more patches are due, the scene is meshed and solved anew, with at most four times as many, and
 //!    the pilot repeated.
 //! 4. All receivers are gathered with half of the rays; the parts of the error are measured again, on all of
 //!    them, and the missing rays follow from that until what 19 of 20 such runs do not exceed
-//!    ([`ErrorParts::upper`]) is within the error. Gather rays are kept: their sequences go on. Only where
-//!    rays cannot make up for the mesh a new one is made, and begins a new gather.
+//!    ([`ErrorParts::upper`]) is within the error. Gather rays are kept: their sequences go on. Shadow rays are
+//!    cast anew where they make noise (`penumbrae`). Only where rays cannot make up for the mesh a new one is
+//!    made, and begins a new gather.
 //!
 //! Many receivers are joined in the planes that they lie in ([`crate::gather::joined`]) before their errors are
 //! measured: each then needs few rays.
@@ -25,14 +26,14 @@ mod memory;
 mod penumbrae;
 
 pub use adapted::Adapted;
-pub use budget::{Budget, Changes, ROW_RAYS, fewest_rays};
+pub use budget::{Budget, ROW_RAYS, fewest_rays};
 pub use indirect_field::FieldGather;
 pub use memory::{bytes_to_gather, bytes_to_refine, bytes_to_solve, first_patches};
 
 use crate::gather::{Components, ErrorParts, Tally};
 use crate::pilot::PilotError;
 use crate::world::{Receiver, World};
-use budget::{JOINED_FROM, Planned, even, least_rays};
+use budget::{Changes, JOINED_FROM, Planned, even, least_rays};
 use gathering::{Gathering, gathers};
 use penumbrae::Penumbrae;
 

@@ -116,3 +116,89 @@ fn key(tally: &Tally) -> (u32, i32) {
     };
     (rays as u32, class)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::budget::{Budget, Changes};
+    use super::*;
+    use crate::gather::ErrorParts;
+    use luxel_scenes::Rgb;
+
+    /// Shadow rays of each receiver so far.
+    const RAYS: usize = 96;
+
+    fn tally(variance: f64) -> Tally {
+        Tally::with_direct_variance(Rgb::splat(variance), RAYS as u32 / 2, 2)
+    }
+
+    /// Nine of ten receivers see the light wholly; the variances of the others rise 2000-fold.
+    fn room() -> Vec<Tally> {
+        let variance = |i: i32| match i % 10 {
+            0 => 1e-3 * 10_f64.powf(f64::from(i) / 300.0),
+            _ => 0.0,
+        };
+        (0..1000).map(|i| tally(variance(i))).collect()
+    }
+
+    #[test]
+    fn nobody_and_nothing_is_no_class() {
+        for tallies in [vec![], vec![tally(0.0); 3]] {
+            let penumbrae = Penumbrae::new(&tallies, 0.0);
+            assert_eq!(penumbrae.classes.len(), 1);
+            assert_eq!(penumbrae.classes[0].receivers, tallies.len());
+            assert!(penumbrae.due(&[RAYS]).is_empty());
+        }
+    }
+
+    #[test]
+    fn classes_hold_all_receivers_and_all_of_the_error() {
+        let penumbrae = Penumbrae::new(&room(), 0.02);
+        let receivers: usize = penumbrae.classes.iter().map(|c| c.receivers).sum();
+        let square: f64 = penumbrae.classes.iter().map(|c| c.square).sum();
+        assert_eq!(receivers, 1000);
+        // A sum of some ten terms.
+        assert!((square / 4e-4 - 1.0).abs() < 1e-14, "{square}");
+        // A variance of 10^3.3 times as much asks for 10^(3.3/2.4) = 24 times the rays: between four and five doublings
+        // in five or six classes, and the class without noise.
+        assert!((6..=7).contains(&penumbrae.classes.len()));
+        assert!(penumbrae.classes.iter().all(|class| class.rays == RAYS));
+    }
+
+    #[test]
+    fn rays_go_where_the_noise_is_and_cost_less_than_for_all() {
+        let tallies = room();
+        let parts = ErrorParts {
+            direct: 0.02,
+            ..ErrorParts::default()
+        };
+        let spent = Budget {
+            patches: 1000,
+            rays: 128,
+            shadow_rays: RAYS,
+        };
+        let plan = |penumbrae: &Penumbrae| {
+            spent.for_error(0.005, &parts, penumbrae, tallies.len(), Changes::Rays)
+        };
+        let even = plan(&Penumbrae::even(tallies.len(), RAYS, RAYS, parts.direct));
+        let penumbrae = Penumbrae::new(&tallies, parts.direct);
+        let planned = plan(&penumbrae);
+        let due = penumbrae.due(&planned.shadow_rays);
+        // Each noisy receiver once, and no other.
+        let mut chosen: Vec<u32> = due.iter().flat_map(|(_, group)| group.clone()).collect();
+        chosen.sort_unstable();
+        assert!(chosen.iter().all(|receiver| receiver % 10 == 0));
+        assert!(due.iter().all(|(rays, _)| *rays > RAYS));
+        // A quarter of the error takes 4^(1/0.7) = 7.2 times the rays of all receivers; of a tenth of them, whose
+        // variances differ, less than a tenth of that. The others keep theirs.
+        let cost: usize = due.iter().map(|(rays, group)| rays * group.len()).sum();
+        assert!(even.budget.shadow_rays > 7 * RAYS, "{even:?}");
+        assert!(cost < even.budget.shadow_rays * 1000 / 10, "{cost}");
+        // And they suffice, as the exponent has it.
+        let square = |(&rays, class): (&usize, &Class)| {
+            class.square * (class.rays as f64 / rays as f64).powf(2.0 * SHADOW_EXPONENT)
+        };
+        let classes = planned.shadow_rays.iter().zip(&penumbrae.classes);
+        let left = classes.map(square).sum::<f64>().sqrt();
+        assert!(left <= 0.005, "{left}");
+    }
+}

@@ -61,3 +61,44 @@ impl LitSum {
 fn of_share(visible: f64) -> f64 {
     (visible * (1.0 - visible)).max(0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_wholly_visible_or_hidden_makes_no_noise() {
+        let mut sum = LitSum::default();
+        sum.add(Rgb::splat(3.0), 1.0, 48);
+        sum.add(Rgb::splat(2.0), 0.0, 1);
+        sum.add(Rgb::splat(5.0), 0.0, 48);
+        assert_eq!(
+            sum.finish(),
+            Lit {
+                irradiance: Irradiance(Rgb::splat(3.0)),
+                variance: Rgb::ZERO
+            }
+        );
+        assert_eq!(LitSum::default().finish(), Lit::default());
+    }
+
+    #[test]
+    fn a_light_of_many_rays_has_the_variance_of_its_share() {
+        let mut sum = LitSum::default();
+        sum.add(Rgb::splat(2.0), 0.25, 16);
+        // 2² · 0.25 · 0.75 / 16, exact in binary.
+        assert_eq!(sum.finish().variance, Rgb::splat(4.0 * 0.1875 / 16.0));
+    }
+
+    #[test]
+    fn lights_of_few_rays_are_judged_together() {
+        // Four lights of one ray each, half of their light seen: Σ E² p (1 − p) = 4 · 1/4.
+        let mut sum = LitSum::default();
+        for visible in [1.0, 0.0, 0.0, 1.0] {
+            sum.add(Rgb::ONE, visible, 1);
+        }
+        let lit = sum.finish();
+        assert_eq!(lit.irradiance, Irradiance(Rgb::splat(2.0)));
+        assert_eq!(lit.variance, Rgb::ONE);
+    }
+}

@@ -144,6 +144,17 @@ impl Tally {
         self.direct_variance = if scatters { mean * mean } else { Rgb::ZERO };
     }
 
+    /// A tally of so many shadow rays of each gather, with an expected variance, for tests.
+    #[cfg(test)]
+    pub(crate) fn with_direct_variance(variance: Rgb, shadow_rays: u32, gathers: u8) -> Self {
+        Self {
+            direct_variance: variance,
+            shadow_rays,
+            gathers,
+            ..Self::default()
+        }
+    }
+
     /// Shadow rays of all gathers.
     pub(crate) fn all_shadow_rays(&self) -> usize {
         self.shadow_rays as usize * usize::from(self.gathers)
