@@ -32,9 +32,14 @@ pub(super) fn gathers(receivers: usize) -> usize {
     }
 }
 
+/// Receivers of a part, unless there are more than this times [`PARTS`]: what is gathered at them is held beside what was
+/// gathered before.
+const RECEIVERS_OF_PART: usize = 1 << 13;
+
 /// Receivers of a part of a gather of so many rays at each.
 fn receivers_of_part(receivers: usize, rays: usize) -> usize {
-    (receivers / PARTS).max(RAYS_OF_PART / rays.max(1)).max(1)
+    let of_rays = (RAYS_OF_PART / rays.max(1)).min(RECEIVERS_OF_PART);
+    (receivers / PARTS).max(of_rays).max(1)
 }
 
 /// Gathers at some receivers, each an item of its own, and joins what that found to their tallies, part after part.
