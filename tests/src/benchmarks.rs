@@ -1,13 +1,14 @@
 //! How fast luxel is, with the error beside every time: what `BENCHMARKS.md` tabulates.
 //!
-//! [`probing`], [`fields`] and [`rendering`] run the command on the reference scenes, as a user would; [`transport`]
-//! casts form factors and sparse rows; [`scaling`] does the same work with one thread and with two. Times are
+//! [`preparing`] reads large scenes and builds their ray trees; [`probing`], [`fields`] and [`rendering`] run the command on
+//! the reference scenes, as a user would; [`transport`] casts form factors and sparse rows; [`scaling`] does the same work with one thread and with two. Times are
 //! of this machine, now: medians of a few runs, reading the scene and building the tree included unless the
 //! table says otherwise. Peak memory is that of the process, from the system (Linux).
 
 mod document;
 pub mod fields;
 mod memory;
+pub mod preparing;
 pub mod probing;
 pub mod rendering;
 pub mod scaling;

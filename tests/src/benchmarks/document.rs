@@ -1,6 +1,6 @@
 //! The tables as Markdown.
 
-use super::{fields, probing, rendering, scaling, transport};
+use super::{fields, preparing, probing, rendering, scaling, transport};
 use crate::accuracy::{largest, median};
 use crate::picture::example;
 use luxel::diff::Difference;
@@ -50,26 +50,27 @@ at every point.
         done(&format!("probe {scene} {percent}"));
     }
     text += "
-## `probe --error 1%`, 100 000 points
+## `probe --error 1%`, many points
 
 Points lie on the faces at random, evenly by area; the first thousand are those of the table above, at which the true error is measured.
 
-| scene | seconds | nRMSE % | stated there % | peak MB |
-|---|--:|--:|--:|--:|
+| scene | points | seconds | nRMSE % | stated there % | peak MB |
+|---|--:|--:|--:|--:|--:|
 ";
-    for scene in fields::SCENES {
-        let field = fields::field(scene, 1.0, runs.min(3));
+    for (scene, points) in fields::FIELDS {
+        let most = if points > 100_000 { 1 } else { 3 };
+        let field = fields::field(scene, points, 1.0, runs.min(most));
         row(
             &mut text,
             format_args!(
-                "{scene} | {:.2} | {:.2} | {:.2} | {}",
+                "{scene} | {points} | {:.2} | {:.2} | {:.2} | {}",
                 field.seconds,
                 100.0 * field.errors.nrmse,
                 100.0 * field.stated,
                 megabytes(field.peak)
             ),
         );
-        done(&format!("field {scene}"));
+        done(&format!("field {scene} {points}"));
     }
     text += "
 ## `render --integrator gather --size 256x256 --error 2%`
@@ -97,6 +98,7 @@ Errors against path-traced pictures whose own noise, 1.0 % (cornell) and 1.3 % (
         );
         done(&format!("render {scene}"));
     }
+    text += &large_scenes(runs, done);
     text += &transports(done);
     text += "
 ## One thread against two
@@ -111,6 +113,36 @@ Errors against path-traced pictures whose own noise, 1.0 % (cornell) and 1.3 % (
         );
     }
     done("scaling");
+    text
+}
+
+fn large_scenes(runs: u64, done: &mut dyn FnMut(&str)) -> String {
+    let mut text = String::from(
+        "
+## Large scenes
+
+Halls of boxes in OBJ files, read whole; then the ray tree is built.
+
+| triangles | file MB | seconds of reading | MB/s | seconds of building | peak MB |
+|--:|--:|--:|--:|--:|--:|
+",
+    );
+    for boxes in [8_000, 83_000] {
+        let prepared = preparing::prepared(boxes, runs);
+        let size = prepared.bytes as f64 / 1e6;
+        row(
+            &mut text,
+            format_args!(
+                "{} | {size:.0} | {:.2} | {:.0} | {:.2} | {}",
+                prepared.triangles,
+                prepared.reading,
+                size / prepared.reading,
+                prepared.building,
+                megabytes(prepared.peak)
+            ),
+        );
+    }
+    done("large scenes");
     text
 }
 

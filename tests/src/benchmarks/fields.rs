@@ -13,11 +13,14 @@ use luxel_scenes::Rgb;
 use luxel_solver::geometry::{Geometry, TriangleId};
 use luxel_solver::sampling::{Discrete, Stage, hash, triangle};
 
-/// The scenes.
-pub const SCENES: [&str; 3] = ["cornell", "corridor", "office"];
-
-/// Points, those of the reference among them.
-const POINTS: usize = 100_000;
+/// The scenes with numbers of points, those of the reference among them.
+pub const FIELDS: [(&str, usize); 5] = [
+    ("cornell", 100_000),
+    ("corridor", 100_000),
+    ("office", 100_000),
+    ("cornell", 1_000_000),
+    ("corridor", 1_000_000),
+];
 
 /// Many points and what they took.
 #[derive(Clone, Copy, Debug)]
@@ -32,15 +35,15 @@ pub struct Field {
     pub stated: f64,
 }
 
-/// Probes a scene `runs` times at a hundred thousand points for an error of `percent`.
+/// Probes a scene `runs` times at `count` points, those of its reference first, for an error of `percent`.
 ///
 /// # Panics
-/// When the command fails, other than by missing the error.
-pub fn field(scene: &str, percent: f64, runs: u64) -> Field {
+/// When the command fails, other than by missing the error, or there are fewer points than in the reference.
+pub fn field(scene: &str, count: usize, percent: f64, runs: u64) -> Field {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let [points, out] = ["points.csv", "out.csv"].map(|name| folder.path().join(name));
     let reference = reference(scene);
-    std::fs::write(&points, points_csv(points_of(&reference))).expect("a table of points");
+    std::fs::write(&points, points_csv(points_of(&reference, count))).expect("a table of points");
     let file = example(scene);
     let error = format!("{percent}%");
     let (seconds, peak, ()) = measured(runs, |seed| {
@@ -52,16 +55,16 @@ pub fn field(scene: &str, percent: f64, runs: u64) -> Field {
             outcome.assert_success();
         }
     });
-    let count = reference.position.len();
+    let known = reference.position.len();
     let found = estimates(&out);
     let (values, errors): (Vec<Rgb>, Vec<Rgb>) = found
         .iter()
-        .take(count)
+        .take(known)
         .map(|estimate| (estimate.value, estimate.standard_error))
         .unzip();
     let square: f64 = errors.iter().map(|error| error.length_squared()).sum();
     let level: f64 = values.iter().map(|value| value.element_sum()).sum();
-    let channels = 3.0 * count as f64;
+    let channels = 3.0 * known as f64;
     Field {
         seconds,
         peak,
@@ -71,7 +74,7 @@ pub fn field(scene: &str, percent: f64, runs: u64) -> Field {
 }
 
 /// The points of a reference, then others on the faces of its scene, evenly by area.
-fn points_of(reference: &IrradianceReference) -> Vec<(DVec3, DVec3)> {
+fn points_of(reference: &IrradianceReference, count: usize) -> Vec<(DVec3, DVec3)> {
     let loaded = luxel_scenes::load(example(&reference.scene)).expect("an example scene");
     let geometry = Geometry::new(&loaded.scene);
     let area = |index: usize| {
@@ -89,6 +92,6 @@ fn points_of(reference: &IrradianceReference) -> Vec<(DVec3, DVec3)> {
     };
     let own = reference.position.iter().zip(&reference.normal);
     let own = own.map(|(&position, &normal)| (position, normal));
-    let further = POINTS - reference.position.len();
+    let further = count - reference.position.len();
     own.chain((0..further as u64).map(on_a_face)).collect()
 }
