@@ -97,7 +97,7 @@ impl Render {
         }
         let [columns, rows] = receivers(size);
         let receivers = columns * rows;
-        let seen = receivers * (size_of::<(Vertex<'_>, Receiver, Rgb)>() + 2 * size_of::<Tally>());
+        let seen = receivers * (size_of::<(Vertex<'_>, Receiver, Rgb)>() + size_of::<Tally>());
         held.with(
             "indirect light of pixels",
             seen + IndirectField::bytes_for(receivers),
