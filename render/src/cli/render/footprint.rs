@@ -86,21 +86,26 @@ impl Render {
         fits
     }
 
-    /// Scene and film, and the field of indirect light where one is made.
+    /// Scene and film, and the field of indirect light where one is made. What is gathered for the field is gone before
+    /// there is a film.
     fn footprint(&self, world: &World<'_>, size: [usize; 2], goal: Option<&Goal>) -> Footprint {
         let pixels = size[0] * size[1];
         let written = Film::bytes_for(pixels) + Picture::bytes_for(pixels, LAYERS);
-        let refined = goal.map_or(0, |_| Film::bytes_to_refine(pixels));
-        let held = Footprint::of(world).with("film and picture", written.max(refined));
+        let film = written.max(goal.map_or(0, |_| Film::bytes_to_refine(pixels)));
+        let held = Footprint::of(world);
         if goal.is_none() || !matches!(self.integrator, Method::Gather | Method::Whitted) {
-            return held;
+            return held.with("film and picture", film);
         }
         let [columns, rows] = receivers(size);
         let receivers = columns * rows;
         let seen = receivers * (size_of::<(Vertex<'_>, Receiver, Rgb)>() + size_of::<Tally>());
         held.with(
+            "film and picture, or before what is gathered",
+            film.max(seen),
+        )
+        .with(
             "indirect light of pixels",
-            seen + IndirectField::bytes_for(receivers),
+            IndirectField::bytes_for(receivers),
         )
     }
 
