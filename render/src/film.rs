@@ -154,11 +154,6 @@ impl Film {
         Self::bytes_for(pixels) + 3 * pixels * CHANNEL
     }
 
-    /// Memory that it holds, in bytes.
-    pub fn bytes(&self) -> usize {
-        self.pixels.capacity() * size_of::<Pixel>()
-    }
-
     /// Width and height in pixels.
     pub fn size(&self) -> [usize; 2] {
         self.size

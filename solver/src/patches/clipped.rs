@@ -3,7 +3,6 @@
 //! Elements are the cells of the grid clipped to the polygon (I. E. Sutherland, G. W. Hodgman,
 //! "Reentrant polygon clipping", Communications of the ACM 17(1), 1974).
 
-use crate::memory::held;
 use glam::{DVec2, DVec3};
 
 /// Cells with less than this share of a full cell are given to the nearest larger one: a sliver of
@@ -24,12 +23,6 @@ pub(super) struct Clipped {
 }
 
 impl Clipped {
-    /// Memory of its arrays in bytes.
-    pub(super) fn bytes(&self) -> usize {
-        let corners = self.elements.iter().map(held);
-        held(&self.element_of_cell) + held(&self.elements) + corners.sum::<usize>()
-    }
-
     /// Divides a planar convex polygon into cells of side `size`, the first edge along the grid.
     pub(super) fn new(polygon: &[DVec3], size: f64) -> Self {
         let normal: DVec3 = polygon[1..]

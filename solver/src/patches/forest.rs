@@ -6,7 +6,6 @@
 //! R. A. Finkel, J. L. Bentley, "Quad Trees: A Data Structure for Retrieval on Composite Keys",
 //! Acta Informatica 4, 1974. Cost of a lookup: one step a level.
 
-use crate::memory::held;
 use std::collections::HashSet;
 
 /// Levels below a root that a leaf can lie on: a path holds two bits for each.
@@ -134,11 +133,6 @@ impl Forest {
             }
         }
         Self::grow(self.roots, |node| divided.contains(&node))
-    }
-
-    /// Memory of its arrays in bytes.
-    pub(super) fn bytes(&self) -> usize {
-        held(&self.nodes) + held(&self.leaves)
     }
 
     /// Number of elements.

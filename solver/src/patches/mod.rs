@@ -28,7 +28,6 @@ pub use mesh::{MAX_PATCHES, MeshError, PatchSize};
 pub use region::SurfaceSample;
 
 use crate::geometry::{Geometry, TriangleId, triangle_count};
-use crate::memory::held;
 use glam::DVec3;
 use luxel_scenes::{Exitance, FaceId, Reflectance, Scene};
 use region::Region;
@@ -86,19 +85,6 @@ impl Patches {
     /// True when the scene has no faces.
     pub fn is_empty(&self) -> bool {
         self.area.is_empty()
-    }
-
-    /// Memory that it holds, in bytes.
-    pub fn bytes(&self) -> usize {
-        let regions = self.regions.iter().map(Region::bytes);
-        held(&self.regions)
-            + regions.sum::<usize>()
-            + held(&self.triangle_region)
-            + held(&self.patch_region)
-            + held(&self.area)
-            + held(&self.size)
-            + held(&self.reflectance)
-            + held(&self.emission)
     }
 
     /// Memory that so many patches of a scene take, in bytes, in quadtrees where they follow a density. Walls

@@ -6,7 +6,6 @@ use super::cuts::{Cuts, Part};
 use super::quad_grid::QuadGrid;
 use super::triangle_grid::TriangleGrid;
 use crate::geometry::{Geometry, ray_origin};
-use crate::memory::held;
 use glam::{DVec3, Vec3};
 use luxel_scenes::FaceId;
 
@@ -66,17 +65,6 @@ impl Region {
     /// Elements on one side.
     pub(super) fn element_count(&self) -> u32 {
         self.shape_count() + self.cuts.as_ref().map_or(0, |cuts| cuts.extra())
-    }
-
-    /// Memory of its arrays in bytes, without what walls divide.
-    pub(super) fn bytes(&self) -> usize {
-        let shape = match &self.shape {
-            Shape::Quad(quad) => quad.forest().bytes(),
-            Shape::Triangle(triangle) => triangle.forest().bytes(),
-            Shape::Clipped(clipped) => clipped.bytes(),
-            Shape::Faces { cumulative } => held(cumulative),
-        };
-        shape + held(&self.faces)
     }
 
     /// Elements of the shape, whether walls divide them or not.

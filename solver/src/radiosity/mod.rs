@@ -11,7 +11,6 @@ pub use memory::bytes_to_solve;
 
 use crate::direct::Lights;
 use crate::error;
-use crate::memory::held;
 use crate::patches::{PatchId, Patches};
 use crate::solvers::{self, Config, Ledger, Outcome, System, SystemError};
 use crate::world::World;
@@ -104,11 +103,6 @@ impl RadiositySolution {
     pub fn bytes_for(patches: usize, against: bool) -> usize {
         patches * Class::COUNT * size_of::<(Irradiance, u32)>()
             + usize::from(against) * patches * size_of::<Irradiance>()
-    }
-
-    /// Memory that its arrays hold, in bytes.
-    pub fn bytes(&self) -> usize {
-        held(&self.irradiance) + held(&self.rays) + held(&self.coarsening)
     }
 
     /// Irradiance (direct and reflected) of a patch as seen in a class, in W/m².

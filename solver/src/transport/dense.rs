@@ -4,7 +4,6 @@
 //! gather, bound by memory bandwidth once F leaves the cache; meant for n up to about 20 000.
 
 use super::Transport;
-use crate::memory::held;
 use luxel_scenes::{Irradiance, Radiosity, Rgb};
 use rayon::prelude::*;
 use thiserror::Error;
@@ -77,11 +76,6 @@ impl Dense {
     /// Memory of the matrix of so many unknowns, in bytes.
     pub fn bytes_for(len: usize) -> usize {
         len * (len + 1) * size_of::<f64>()
-    }
-
-    /// Memory that it holds, in bytes.
-    pub fn bytes(&self) -> usize {
-        held(&self.entries) + held(&self.row_sums)
     }
 
     /// One row of F.

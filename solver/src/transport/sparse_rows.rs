@@ -6,7 +6,6 @@
 //! a gather costs about 2 ns a ray.
 
 use super::Transport;
-use crate::memory::held;
 use luxel_scenes::{Irradiance, Radiosity, Rgb};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -61,11 +60,6 @@ impl SparseRows {
     /// Memory of so many rows and entries, in bytes.
     pub fn bytes_for(rows: usize, entries: usize) -> usize {
         rows * size_of::<Row>() + entries * size_of::<u32>()
-    }
-
-    /// Memory that it holds, in bytes.
-    pub fn bytes(&self) -> usize {
-        held(&self.entries) + held(&self.rows)
     }
 
     /// Rays of a row; zero for a row that was not cast.
