@@ -77,7 +77,7 @@ impl Transport {
                 + SOLUTIONS as usize * RadiositySolution::bytes_for(patches, false)
         };
         let shown = |patches: usize| RadiosityView::bytes_for(patches, SOLUTIONS as usize);
-        let fine = patches + patches / 10;
+        let fine = Patches::at_most(patches);
         let coarse = fine / 4;
         let work = bytes_to_solve(fine, VIEW_ROW_RAYS, false).max(shown(fine) + shown(coarse));
         solved(fine) + solved(coarse) + work

@@ -9,15 +9,11 @@ use luxel_solver::adaptive::{bytes_to_gather, bytes_to_solve};
 use luxel_solver::patches::Patches;
 use luxel_solver::transport::{Columns, Dense, SparseRows};
 
-/// How many more patches than asked for a mesh may have.
-const OVERSHOOT: f64 = 1.1;
-
 impl Family {
     /// Memory of a size at so many receivers, in bytes. Operators are counted with what they are made from, and twice
     /// where the first of several is kept.
     pub fn bytes(self, step: u32, receivers: usize, scene: &Scene) -> usize {
-        let patches = self.patches(step).unwrap_or(0) as f64;
-        let patches = (patches * OVERSHOOT) as usize;
+        let patches = Patches::at_most(self.patches(step).unwrap_or(0));
         let matrix = Dense::bytes_for(patches);
         let pairs = patches * patches;
         let solving =

@@ -12,13 +12,10 @@ use crate::radiosity::{self, RadiositySolution};
 use crate::world::Receiver;
 use luxel_scenes::Scene;
 
-/// How many more patches than asked for a mesh may have: the mesher stops within a tenth.
-const OVERSHOOT: f64 = 1.1;
-
 /// Memory while a mesh of about so many patches is solved, and another of a quarter of them, in bytes: both meshes, all
 /// solutions, and the work on the last one.
 pub fn bytes_to_solve(patches: usize, scene: &Scene) -> usize {
-    let fine = (patches as f64 * OVERSHOOT) as usize;
+    let fine = Patches::at_most(patches);
     let coarse = fine / 4;
     let solutions = |patches| MAX_REPLICATES * RadiositySolution::bytes_for(patches, false);
     Patches::bytes_for(fine, scene)
@@ -31,7 +28,7 @@ pub fn bytes_to_solve(patches: usize, scene: &Scene) -> usize {
 /// As [`bytes_to_solve`], while coarser solutions are kept that the new ones take the place of: at least
 /// so much finer as is worth a new mesh.
 pub fn bytes_to_refine(patches: usize, scene: &Scene) -> usize {
-    let kept = (patches as f64 * OVERSHOOT / WORTHWHILE) as usize;
+    let kept = (Patches::at_most(patches) as f64 / WORTHWHILE) as usize;
     bytes_to_solve(patches, scene) + Lookup::bytes_for(kept, MAX_REPLICATES, scene)
 }
 

@@ -87,6 +87,11 @@ impl Patches {
         self.area.is_empty()
     }
 
+    /// The most patches that a mesh of about `count` has before walls divide any: the mesher stops within a tenth.
+    pub fn at_most(count: usize) -> usize {
+        count + count / 10
+    }
+
     /// Memory that so many patches of a scene take, in bytes, in quadtrees where they follow a density. Walls
     /// that divide patches are not known before they are found.
     pub fn bytes_for(patches: usize, scene: &Scene) -> usize {
