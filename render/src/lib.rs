@@ -21,6 +21,7 @@ pub mod files;
 pub mod film;
 pub mod image;
 pub mod integrators;
+pub mod lightmap;
 pub mod matrix;
 pub mod ply;
 pub mod points;

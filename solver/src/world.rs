@@ -149,6 +149,16 @@ impl<'s> World<'s> {
         patches.seen_from(ray.origin.as_dvec3(), triangle, position, side)
     }
 
+    /// Whether a ray met the back of a one-sided face: it set out from inside a solid, or the scene is open there.
+    pub fn meets_back(&self, ray: &Ray, hit: &Hit) -> bool {
+        hit.triangle().is_some_and(|triangle| {
+            let geometry = self.surfaces.geometry();
+            let face = geometry.face(triangle);
+            let side = Side::facing(ray.direction.as_dvec3(), geometry.normal(face));
+            !self.surfaces.has_side(face, side)
+        })
+    }
+
     /// Receivers from world positions (metres) and normals. A position within rounding of a face
     /// that looks along the normal is taken to lie on it; others float freely.
     ///

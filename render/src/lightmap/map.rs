@@ -1,0 +1,90 @@
+//! The texels of a lightmap: what they hold and what they stand for.
+
+use super::atlas::Atlas;
+use super::luxels::Luxel;
+use crate::image::Image;
+use luxel_scenes::Rgb;
+
+/// What a texel is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Texel {
+    /// No face is there; its value is that of the nearest chart.
+    Empty,
+    /// A face is there, but its points lie under other geometry; its value is that of its neighbours.
+    Buried,
+    /// Light was gathered for it.
+    Lit,
+}
+
+/// Values of all texels of an atlas, page by page and row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lightmap {
+    /// Width and height of every page in texels.
+    pub size: [usize; 2],
+    /// Number of pages.
+    pub pages: usize,
+    /// What each texel is.
+    pub texels: Vec<Texel>,
+    /// Irradiance in W/m² (lx), zero where nothing is known.
+    pub values: Vec<Rgb>,
+    /// Standard error of the values, in the same unit.
+    pub errors: Vec<Rgb>,
+}
+
+impl Lightmap {
+    /// A map with values and standard errors at luxels, and nothing elsewhere.
+    ///
+    /// # Panics
+    /// When there is not one value and one error for each luxel.
+    pub fn new(
+        atlas: &Atlas,
+        luxels: &[Luxel],
+        buried: &[u32],
+        values: &[Rgb],
+        errors: &[Rgb],
+    ) -> Self {
+        assert!(
+            luxels.len() == values.len() && luxels.len() == errors.len(),
+            "a value and an error a luxel"
+        );
+        let count = atlas.texels();
+        let mut map = Self {
+            size: atlas.size,
+            pages: atlas.pages,
+            texels: vec![Texel::Empty; count],
+            values: vec![Rgb::ZERO; count],
+            errors: vec![Rgb::ZERO; count],
+        };
+        for &texel in buried {
+            map.texels[texel as usize] = Texel::Buried;
+        }
+        for ((luxel, value), error) in luxels.iter().zip(values).zip(errors) {
+            let texel = luxel.texel as usize;
+            map.texels[texel] = Texel::Lit;
+            map.values[texel] = *value;
+            map.errors[texel] = *error;
+        }
+        map
+    }
+
+    /// Texels of a page.
+    pub fn page_texels(&self) -> usize {
+        self.size[0] * self.size[1]
+    }
+
+    /// Memory of maps of so many texels, in bytes.
+    pub fn bytes_for(texels: usize) -> usize {
+        texels * (size_of::<Texel>() + 2 * size_of::<Rgb>())
+    }
+
+    /// One of the pages of some values.
+    pub fn page(&self, page: usize, values: &[Rgb]) -> Image {
+        let texels = self.page_texels();
+        let own = &values[page * texels..(page + 1) * texels];
+        Image {
+            width: self.size[0],
+            height: self.size[1],
+            pixels: own.iter().map(|value| value.as_vec3().to_array()).collect(),
+        }
+    }
+}
