@@ -47,7 +47,7 @@ pub(crate) fn cast(world: &World<'_>, rays: &[CameraRay]) -> (Vec<Ray>, Vec<Hit>
 }
 
 /// Radiance from beyond the scene along a ray that met nothing.
-fn background(world: &World<'_>, ray: &Ray) -> Rgb {
+pub(crate) fn background(world: &World<'_>, ray: &Ray) -> Rgb {
     let direction = ray.direction.as_dvec3();
     world.lights().sky(world.surfaces(), direction).0
 }

@@ -8,9 +8,11 @@
 pub mod atlas;
 pub mod bake;
 pub mod dilation;
+pub mod fit;
 pub mod lookup;
 pub mod luxels;
 pub mod map;
 pub mod receivers;
 pub mod seams;
 pub mod unwrap;
+pub mod view;

@@ -100,6 +100,7 @@ exits_with! {
     luxel_solver::pilot::PilotError => InvalidInput,
     luxel_solver::solvers::DirectError => Failure,
     luxel_solver::solvers::NotReciprocal => InvalidInput,
+    crate::lightmap::unwrap::UnwrapError => InvalidInput,
     crate::ply::TooManyCorners => Failure,
     csv::Error => Failure,
     std::io::Error => Failure,

@@ -3,6 +3,7 @@
 //! stdout carries results only; progress, summaries, warnings and errors go to stderr. The verbs
 //! read their arguments, call the library and print; what they compute lives elsewhere.
 
+mod bake;
 mod check;
 mod common;
 mod converge;
@@ -50,6 +51,7 @@ enum Verb {
     Render(render::Render),
     Solve(solve::Solve),
     Probe(probe::Probe),
+    Bake(bake::Bake),
     FormFactors(form_factors::FormFactors),
     Converge(converge::Converge),
     Check(check::Check),
@@ -121,6 +123,7 @@ pub fn run_with(
         Verb::Render(verb) => verb.run(&mut session),
         Verb::Solve(verb) => verb.run(&mut session),
         Verb::Probe(verb) => verb.run(&mut session),
+        Verb::Bake(verb) => verb.run(&mut session),
         Verb::FormFactors(verb) => verb.run(&mut session),
         Verb::Converge(verb) => verb.run(&mut session),
         Verb::Check(verb) => verb.run(&mut session),

@@ -60,7 +60,7 @@ impl<'w> Vertex<'w> {
     }
 
     /// Radiance that the surface itself sends along the ray.
-    pub(super) fn emission(&self) -> Radiance {
+    pub(crate) fn emission(&self) -> Radiance {
         if self.is_lit_side() {
             self.world.surfaces().emission(self.interaction.point)
         } else {

@@ -61,6 +61,11 @@ impl Atlas {
         self.size[0] * self.size[1] * self.pages
     }
 
+    /// Position of a texel: page by page, row by row.
+    pub fn texel(&self, page: u32, column: usize, row: usize) -> usize {
+        (page as usize * self.size[1] + row) * self.size[0] + column
+    }
+
     /// The chart of a face with its id; `None` where it has none.
     pub fn chart(&self, face: FaceId) -> Option<(ChartId, Chart)> {
         let id = self.face_chart[face.index()]?;

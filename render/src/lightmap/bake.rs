@@ -72,13 +72,6 @@ pub fn bake(
     Ok(Some(Baked { gathered, adaptive }))
 }
 
-/// The map of what was gathered, before anything is filled or filtered.
-pub fn map(atlas: &Atlas, lit: &Lit, gathered: &[Gathered]) -> Lightmap {
-    let values: Vec<Rgb> = gathered.iter().map(|g| g.irradiance().0).collect();
-    let errors: Vec<Rgb> = gathered.iter().map(|g| g.standard_error().0).collect();
-    Lightmap::new(atlas, &lit.luxels, &lit.buried, &values, &errors)
-}
-
 /// Adds to the errors of lit luxels what bilinear filtering leaves between their centres: of a function of second derivatives f_xx and
 /// f_yy at most (|f_xx| + |f_yy|) / 8 in texels, judged by differences of neighbours in the same chart less the noise in
 /// them. Valid where light varies slowly against a texel; at the outlines of sharp shadows it is of the size of the step.

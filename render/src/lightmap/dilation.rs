@@ -37,6 +37,7 @@ pub fn dilate(
         mark_buried(atlas, triangles, map, &mut buried);
     }
     let mut front: Vec<usize> = luxels.iter().map(|luxel| luxel.texel as usize).collect();
+    front.dedup();
     while !front.is_empty() {
         let mut next = Vec::new();
         for &texel in &front {
@@ -82,7 +83,7 @@ fn mark_buried(atlas: &Atlas, triangles: &[Placed], map: &Lightmap, buried: &mut
         let [columns, rows] = triangle.texels(atlas.size);
         for row in rows {
             for column in columns.clone() {
-                let texel = (triangle.page as usize * atlas.size[1] + row) * atlas.size[0] + column;
+                let texel = atlas.texel(triangle.page, column, row);
                 if map.texels[texel] == Texel::Buried
                     && buried[texel] == NO_CHART
                     && triangle.overlaps(column, row)

@@ -1,8 +1,9 @@
 //! Which texels get light, and from which point of which face: conservative rasterisation of the charts.
 //!
-//! A texel is a *luxel* when its square shares area with a face, however little: bilinear filtering reads it. Its point is the
-//! place of a face that is nearest to the texel's centre, the centre itself where a face lies there; so that neighbours
-//! across a chart's edge are clamped to the edge. Of faces at the same distance the first counts.
+//! A texel gets light when its square shares area with a face, however little: bilinear filtering reads it. Its point is its
+//! centre where a face lies there. Beside a chart's edge it has those of four points within it that lie on the chart, or the
+//! chart's point that is nearest to its centre where none does; [`super::fit`] finds what the texel has to hold for filtering
+//! to give the light at these points. Of faces at the same place the first counts.
 //!
 //! Source: J. Hasselgren, T. Akenine-Möller, L. Ohlsson, "Conservative Rasterization", GPU Gems 2, 2005 (the squares that
 //! triangles overlap). Cost: a few operations for each texel of each triangle's box.
@@ -12,19 +13,33 @@ use glam::DVec2;
 use luxel_scenes::Scene;
 use luxel_solver::geometry::{Geometry, TriangleId};
 use luxel_solver::surface::SurfacePoint;
+use std::collections::HashMap;
 
-/// A texel with a point on a face.
+/// A point on a face that tells what a texel holds. A texel may have several.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Luxel {
     /// Position of the texel: page by page, row by row.
     pub texel: u32,
     /// The chart that it belongs to.
     pub chart: ChartId,
-    /// The point that stands for it.
+    /// The point.
     pub point: SurfacePoint,
     /// That point from the texel's centre, in texels.
     pub offset: DVec2,
 }
+
+impl Luxel {
+    /// Whether its point is its texel's centre.
+    pub fn is_centred(&self) -> bool {
+        self.offset == DVec2::ZERO
+    }
+}
+
+/// Width in texels of a strip of a texel that is too narrow to give it light: rounding makes such.
+const MARGIN: f64 = 0.01;
+
+/// How far from an edge, in texels, points are that would lie on it.
+const INSET: f64 = 0.05;
 
 /// A triangle of a chart in texels of its page.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +64,12 @@ impl Placed {
             (place - a).perp_dot(c - a) / area,
             (b - a).perp_dot(place - a) / area,
         ]
+    }
+
+    /// Whether a place lies in the triangle or at its edge.
+    pub fn contains(&self, place: DVec2) -> bool {
+        let [u, v] = self.weights(place);
+        u >= 0.0 && v >= 0.0 && u + v <= 1.0
     }
 
     /// The place of the triangle nearest to `place`, and its weights.
@@ -84,12 +105,29 @@ impl Placed {
         [0, 1].map(|axis| low[axis] as usize..(high[axis] as usize).min(size[axis]))
     }
 
-    /// Whether the square of texel (column, row) shares area with it: no edge has the square beyond it.
+    /// The place of the triangle nearest to `place`, but not on its edges, where geometry that it meets there would hide
+    /// a light by rounding alone; and its weights.
+    pub fn inside(&self, place: DVec2) -> (DVec2, [f64; 2]) {
+        let (nearest, weights) = self.nearest(place);
+        let [a, b, c] = self.corners;
+        let inwards = (a + b + c) / 3.0 - nearest;
+        let least = weights[0]
+            .min(weights[1])
+            .min(1.0 - weights[0] - weights[1]);
+        if least > 0.0 {
+            return (nearest, weights);
+        }
+        let share = (INSET / inwards.length()).min(0.5);
+        let place = nearest + inwards * share;
+        (place, self.weights(place))
+    }
+
+    /// Whether the square of texel (column, row) shares area with it: no edge has all but a margin of the square beyond it.
     pub(super) fn overlaps(&self, column: usize, row: usize) -> bool {
         let centre = DVec2::new(column as f64 + 0.5, row as f64 + 0.5);
         [(0, 1), (1, 2), (2, 0)].iter().all(|&(from, to)| {
             let (a, edge) = (self.corners[from], self.corners[to] - self.corners[from]);
-            let reach = 0.5 * (edge.x.abs() + edge.y.abs());
+            let reach = 0.5 * (edge.x.abs() + edge.y.abs()) - MARGIN * edge.length();
             edge.perp_dot(centre - a) > -reach
         })
     }
@@ -120,12 +158,35 @@ pub fn placed(atlas: &Atlas, scene: &Scene, geometry: &Geometry) -> Vec<Placed> 
         .collect()
 }
 
-/// All luxels of an atlas, in the order of their texels.
+/// Places in a texel from its centre that are tried where no face lies at the centre.
+const QUARTERS: [DVec2; 4] = [
+    DVec2::new(-0.25, -0.25),
+    DVec2::new(0.25, -0.25),
+    DVec2::new(-0.25, 0.25),
+    DVec2::new(0.25, 0.25),
+];
+
+/// Charts of so many texels have no centre that tells what lies around it: all their texels get several points.
+const SMALL_CHART: usize = 12;
+
+/// What was found of a texel.
+#[derive(Clone, Copy)]
+struct Found {
+    /// The triangle nearest to the centre, and the square of its distance.
+    nearest: (u32, f32),
+    /// The first triangle at each of the quarters.
+    quarters: [u32; 4],
+}
+
+const NONE: u32 = u32::MAX;
+
+/// The luxels of an atlas, in the order of their texels.
 pub fn luxels(atlas: &Atlas, triangles: &[Placed]) -> Vec<Luxel> {
-    const NONE: u32 = u32::MAX;
-    let [width, height] = atlas.size;
-    // By texel the nearest triangle so far, and how far it is.
-    let mut nearest = vec![(NONE, f32::INFINITY); atlas.texels()];
+    let nothing = Found {
+        nearest: (NONE, f32::INFINITY),
+        quarters: [NONE; 4],
+    };
+    let mut found = vec![nothing; atlas.texels()];
     for (index, triangle) in triangles.iter().enumerate() {
         let [columns, rows] = triangle.texels(atlas.size);
         for row in rows {
@@ -135,23 +196,34 @@ pub fn luxels(atlas: &Atlas, triangles: &[Placed]) -> Vec<Luxel> {
                 }
                 let centre = DVec2::new(column as f64 + 0.5, row as f64 + 0.5);
                 let distance = triangle.nearest(centre).0.distance_squared(centre) as f32;
-                let texel = (triangle.page as usize * height + row) * width + column;
-                if distance < nearest[texel].1 {
-                    nearest[texel] = (index as u32, distance);
+                let found = &mut found[atlas.texel(triangle.page, column, row)];
+                if distance < found.nearest.1 {
+                    found.nearest = (index as u32, distance);
+                }
+                for (quarter, offset) in found.quarters.iter_mut().zip(QUARTERS) {
+                    if *quarter == NONE && triangle.contains(centre + offset) {
+                        *quarter = index as u32;
+                    }
                 }
             }
         }
     }
-    let found = nearest
-        .iter()
-        .enumerate()
-        .filter(|(_, found)| found.0 != NONE);
-    found
-        .map(|(texel, &(index, _))| {
-            let triangle = &triangles[index as usize];
-            let centre = centre(atlas, texel);
-            let (place, [u, v]) = triangle.nearest(centre);
-            Luxel {
+    let mut texels_of: HashMap<ChartId, usize> = HashMap::new();
+    for found in &found {
+        if let Some(triangle) = triangles.get(found.nearest.0 as usize) {
+            *texels_of.entry(triangle.chart).or_default() += 1;
+        }
+    }
+    let mut luxels = Vec::new();
+    for (texel, found) in found.iter().enumerate() {
+        if found.nearest.0 == NONE {
+            continue;
+        }
+        let centre = centre(atlas, texel);
+        let first = &triangles[found.nearest.0 as usize];
+        let mut push = |triangle: &Placed, place: DVec2| {
+            let (place, [u, v]) = triangle.inside(place);
+            luxels.push(Luxel {
                 texel: texel as u32,
                 chart: triangle.chart,
                 point: SurfacePoint {
@@ -160,9 +232,22 @@ pub fn luxels(atlas: &Atlas, triangles: &[Placed]) -> Vec<Luxel> {
                     v,
                 },
                 offset: place - centre,
-            }
-        })
-        .collect()
+            });
+        };
+        let quarters = found.quarters.iter().zip(QUARTERS);
+        let inside = quarters.filter_map(|(&index, offset)| {
+            let triangle = triangles.get(index as usize)?;
+            (triangle.chart == first.chart).then_some((triangle, centre + offset))
+        });
+        let mut inside = inside.peekable();
+        let is_small = texels_of[&first.chart] <= SMALL_CHART;
+        if first.contains(centre) && !is_small || inside.peek().is_none() {
+            push(first, centre);
+        } else {
+            inside.for_each(|(triangle, place)| push(triangle, place));
+        }
+    }
+    luxels
 }
 
 /// The centre of a texel in its page.

@@ -4,6 +4,7 @@ use super::atlas::Atlas;
 use super::luxels::Luxel;
 use crate::image::Image;
 use luxel_scenes::Rgb;
+use luxel_solver::gather::Gathered;
 
 /// What a texel is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,20 +33,15 @@ pub struct Lightmap {
 }
 
 impl Lightmap {
-    /// A map with values and standard errors at luxels, and nothing elsewhere.
+    /// A map with what was gathered at luxels, and nothing elsewhere. A texel of several luxels holds their mean.
     ///
     /// # Panics
-    /// When there is not one value and one error for each luxel.
-    pub fn new(
-        atlas: &Atlas,
-        luxels: &[Luxel],
-        buried: &[u32],
-        values: &[Rgb],
-        errors: &[Rgb],
-    ) -> Self {
-        assert!(
-            luxels.len() == values.len() && luxels.len() == errors.len(),
-            "a value and an error a luxel"
+    /// When there is not one of `gathered` for each luxel.
+    pub fn new(atlas: &Atlas, luxels: &[Luxel], buried: &[u32], gathered: &[Gathered]) -> Self {
+        assert_eq!(
+            luxels.len(),
+            gathered.len(),
+            "something gathered at each luxel"
         );
         let count = atlas.texels();
         let mut map = Self {
@@ -58,11 +54,20 @@ impl Lightmap {
         for &texel in buried {
             map.texels[texel as usize] = Texel::Buried;
         }
-        for ((luxel, value), error) in luxels.iter().zip(values).zip(errors) {
-            let texel = luxel.texel as usize;
+        let mut rest = gathered;
+        for own in luxels.chunk_by(|a, b| a.texel == b.texel) {
+            let (gathered, after) = rest.split_at(own.len());
+            rest = after;
+            let share = 1.0 / own.len() as f64;
+            let mean =
+                |value: fn(&Gathered) -> Rgb| gathered.iter().map(value).sum::<Rgb>() * share;
+            // Noise is each luxel's own, the error of the mesh is common to all.
+            let noise = mean(|g| g.sampling().0 * g.sampling().0) * share;
+            let mesh = mean(|g| g.discretisation.0);
+            let texel = own[0].texel as usize;
             map.texels[texel] = Texel::Lit;
-            map.values[texel] = *value;
-            map.errors[texel] = *error;
+            map.values[texel] = mean(|g| g.irradiance().0);
+            map.errors[texel] = (noise + mesh * mesh).map(f64::sqrt);
         }
         map
     }

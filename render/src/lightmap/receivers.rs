@@ -18,7 +18,7 @@ use luxel_solver::sampling::{Frame, Sequence, Stage, cosine_hemisphere};
 use luxel_solver::surface::SurfacePoint;
 use luxel_solver::world::{Receiver, World};
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 /// Rays by which a point is judged.
 const RAYS: u32 = 16;
@@ -39,7 +39,7 @@ pub struct Lit {
     pub buried: Vec<u32>,
 }
 
-/// Finds points of luxels of whose rays no more than the share `tolerance` meets backs.
+/// Keeps the luxels of whose rays no more than the share `tolerance` meets backs; texels that lose all get other points.
 pub fn lit(
     world: &World<'_>,
     atlas: &Atlas,
@@ -48,14 +48,27 @@ pub fn lit(
     tolerance: f64,
 ) -> Lit {
     let is_buried = buried(world, &luxels, tolerance);
-    let first: Vec<usize> = (0..luxels.len())
-        .filter(|&index| is_buried[index])
-        .collect();
-    // Other points of the same texels.
-    let tries = other_points(atlas, triangles, first.iter().map(|&index| &luxels[index]));
-    let is_buried_too = buried(world, &tries, tolerance);
-    let mut better: HashMap<u32, Luxel> = HashMap::new();
-    for (luxel, buried) in tries.iter().zip(is_buried_too) {
+    let mut lost: Vec<u32> = Vec::new();
+    for (own, is_buried) in
+        luxels
+            .chunk_by(|a, b| a.texel == b.texel)
+            .scan(is_buried.as_slice(), |rest, own| {
+                let (first, after) = rest.split_at(own.len());
+                *rest = after;
+                Some((own, first))
+            })
+    {
+        if is_buried.iter().all(|&buried| buried) {
+            lost.push(own[0].texel);
+        }
+    }
+    let mut is_buried = is_buried.into_iter();
+    luxels.retain(|_| is_buried.next() == Some(false));
+    // Other points of the texels that lost all.
+    let tries = other_points(atlas, triangles, &lost);
+    let is_buried = buried(world, &tries, tolerance);
+    let mut better: BTreeMap<u32, Luxel> = BTreeMap::new();
+    for (luxel, buried) in tries.iter().zip(is_buried) {
         if buried {
             continue;
         }
@@ -65,16 +78,9 @@ pub fn lit(
             *best = *luxel;
         }
     }
-    let mut lost = Vec::new();
-    for index in first {
-        let texel = luxels[index].texel;
-        match better.get(&texel) {
-            Some(luxel) => luxels[index] = *luxel,
-            None => lost.push(texel),
-        }
-    }
-    let mut gone = lost.iter().peekable();
-    luxels.retain(|luxel| gone.next_if_eq(&&luxel.texel).is_none());
+    lost.retain(|texel| !better.contains_key(texel));
+    luxels.extend(better.into_values());
+    luxels.sort_by_key(|luxel| luxel.texel);
     let receivers = luxels
         .par_iter()
         .map(|luxel| receiver(world, luxel.point))
@@ -86,29 +92,25 @@ pub fn lit(
     }
 }
 
-/// The points of a regular grid in some texels that lie on faces.
-fn other_points<'l>(
-    atlas: &Atlas,
-    triangles: &[Placed],
-    of: impl Iterator<Item = &'l Luxel>,
-) -> Vec<Luxel> {
-    let texels: HashMap<u32, ()> = of.map(|luxel| (luxel.texel, ())).collect();
+/// The points of a regular grid in some texels, given in order, that lie on faces.
+fn other_points(atlas: &Atlas, triangles: &[Placed], texels: &[u32]) -> Vec<Luxel> {
     if texels.is_empty() {
         return Vec::new();
     }
-    let [width, height] = atlas.size;
     let mut found = Vec::new();
     for triangle in triangles {
         let [columns, rows] = triangle.texels(atlas.size);
         for row in rows {
             for column in columns.clone() {
-                let texel = (triangle.page as usize * height + row) * width + column;
-                if !texels.contains_key(&(texel as u32)) {
+                let texel = atlas.texel(triangle.page, column, row);
+                if texels.binary_search(&(texel as u32)).is_err() {
                     continue;
                 }
-                found.extend(grid().filter_map(|offset| {
-                    let [u, v] = triangle.weights(centre(atlas, texel) + offset);
-                    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then_some(Luxel {
+                let places = grid().map(|offset| (offset, centre(atlas, texel) + offset));
+                let inside = places.filter(|(_, place)| triangle.contains(*place));
+                found.extend(inside.map(|(offset, place)| {
+                    let [u, v] = triangle.weights(place);
+                    Luxel {
                         texel: texel as u32,
                         chart: triangle.chart,
                         point: SurfacePoint {
@@ -117,7 +119,7 @@ fn other_points<'l>(
                             v,
                         },
                         offset,
-                    })
+                    }
                 }));
             }
         }

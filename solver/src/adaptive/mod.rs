@@ -63,6 +63,11 @@ const MESH_SHARE: f64 = 0.8;
 /// Rounds after which an error counts as out of reach: each doubles something.
 const MAX_ROUNDS: usize = 24;
 
+/// Shadow rays that each of many receivers begins with: enough to tell penumbrae from what sees a light wholly, which
+/// gets no more. At 190 000 receivers of bare rooms, 96, 32, 16 and 8 take 4.4, 3.2, 2.7 and 2.3 s without penumbrae, 4.3, 3.3,
+/// 4.2 and 4.1 s with large ones.
+const FIRST_JOINED_SHADOW_RAYS: usize = 16;
+
 /// Rays for the sky that are begun with, and the largest growth of their number in a round. Once they
 /// have found the openings their error falls much faster than that of other rays, which no
 /// extrapolation knows of: fewer tell nothing (160 % stated at 328 rays behind a small window, where
@@ -298,6 +303,8 @@ fn first_budget(world: &World, error: f64, receivers: usize) -> Budget {
     let budget = Budget::pilot(error);
     let shadow_rays = if world.lights().has_sky() {
         FIRST_SKY_RAYS
+    } else if receivers >= JOINED_FROM {
+        FIRST_JOINED_SHADOW_RAYS
     } else {
         budget.shadow_rays
     };
