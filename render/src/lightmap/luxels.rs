@@ -125,10 +125,13 @@ impl Placed {
     /// Whether the square of texel (column, row) shares area with it: no edge has all but a margin of the square beyond it.
     pub(super) fn overlaps(&self, column: usize, row: usize) -> bool {
         let centre = DVec2::new(column as f64 + 0.5, row as f64 + 0.5);
+        let [a, b, c] = self.corners;
+        // A mirrored triangle has its inside on the other side of its edges.
+        let side = (b - a).perp_dot(c - a).signum();
         [(0, 1), (1, 2), (2, 0)].iter().all(|&(from, to)| {
             let (a, edge) = (self.corners[from], self.corners[to] - self.corners[from]);
             let reach = 0.5 * (edge.x.abs() + edge.y.abs()) - MARGIN * edge.length();
-            edge.perp_dot(centre - a) > -reach
+            side * edge.perp_dot(centre - a) > -reach
         })
     }
 }
@@ -153,7 +156,7 @@ pub fn placed(atlas: &Atlas, scene: &Scene, geometry: &Geometry) -> Vec<Placed> 
         // A sliver of a face may have no area in texels; its texels are its neighbours'.
         .filter(|placed| {
             let [a, b, c] = placed.corners;
-            (b - a).perp_dot(c - a) > 0.0
+            (b - a).perp_dot(c - a).abs() > 0.0
         })
         .collect()
 }

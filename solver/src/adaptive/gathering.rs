@@ -125,6 +125,7 @@ impl<'a> Gathering<'a> {
             solver_bound: lookup.map_or(0.0, Lookup::solver_bound),
             budget: self.spent,
             patches: lookup.map_or(0, |lookup| lookup.patches().len()),
+            ledger: lookup.map(Lookup::ledger),
             ending: Ending::Stopped,
         }
     }

@@ -32,6 +32,7 @@ pub use memory::{bytes_to_gather, bytes_to_refine, bytes_to_solve, first_patches
 
 use crate::gather::{Components, ErrorParts, Tally};
 use crate::pilot::PilotError;
+use crate::solvers::Ledger;
 use crate::world::{Receiver, World};
 use budget::{Changes, JOINED_FROM, Planned, even, least_rays};
 use gathering::{Gathering, gathers};
@@ -138,6 +139,8 @@ pub struct Adaptive {
     pub budget: Budget,
     /// Patches of the mesh that was looked up.
     pub patches: usize,
+    /// Where the flux goes in its solutions; `None` where none was looked up.
+    pub ledger: Option<Ledger>,
     /// Why no more was done.
     pub ending: Ending,
 }
@@ -293,6 +296,7 @@ impl Adaptive {
             solver_bound: 0.0,
             budget: Budget::default(),
             patches: 0,
+            ledger: None,
             ending: Ending::Stopped,
         }
     }

@@ -10,6 +10,7 @@
 use crate::geometry::TriangleId;
 use crate::patches::{PatchId, Patches, Side};
 use crate::radiosity::{Class, RadiositySolution, unknown};
+use crate::solvers::Ledger;
 use glam::{DVec3, Vec3};
 use luxel_scenes::{Rgb, Scene};
 use std::ops::Range;
@@ -26,6 +27,7 @@ pub struct Lookup {
     coarse: Option<Table>,
     solutions: usize,
     solver_bound: f64,
+    ledger: Ledger,
 }
 
 /// Which of the solutions count.
@@ -47,7 +49,9 @@ impl Lookup {
             (1..=MAX_REPLICATES).contains(&solutions.len()),
             "one to {MAX_REPLICATES} solutions"
         );
+        let ledgers: Vec<Ledger> = solutions.iter().map(|solution| solution.ledger).collect();
         Self {
+            ledger: Ledger::mean(&ledgers),
             fine: Table::new(patches, solutions),
             coarse: None,
             solutions: solutions.len(),
@@ -87,6 +91,11 @@ impl Lookup {
     /// looked up, and of what is gathered from it.
     pub fn solver_bound(&self) -> f64 {
         self.solver_bound
+    }
+
+    /// Where the flux goes, the mean over the solutions of the mesh.
+    pub fn ledger(&self) -> Ledger {
+        self.ledger
     }
 
     /// Number of independent solutions.

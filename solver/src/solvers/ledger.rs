@@ -76,6 +76,26 @@ impl Ledger {
         ledger
     }
 
+    /// The mean of the ledgers of independent solutions.
+    ///
+    /// # Panics
+    /// When there is none.
+    pub fn mean(ledgers: &[Self]) -> Self {
+        assert!(!ledgers.is_empty(), "a ledger to take the mean of");
+        let mean = |entry: fn(&Self) -> Flux| {
+            let sum: Rgb = ledgers.iter().map(|ledger| entry(ledger).0).sum();
+            Flux(sum / ledgers.len() as f64)
+        };
+        Self {
+            emitted: mean(|ledger| ledger.emitted),
+            direct: mean(|ledger| ledger.direct),
+            absorbed: mean(|ledger| ledger.absorbed),
+            escaped: mean(|ledger| ledger.escaped),
+            defect: mean(|ledger| ledger.defect),
+            residual: mean(|ledger| ledger.residual),
+        }
+    }
+
     /// (in − out) / in per channel, where in = emitted + direct and out is everything else: zero to
     /// rounding. Zero in a channel without light.
     pub fn imbalance(&self) -> Rgb {

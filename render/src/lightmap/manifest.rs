@@ -1,0 +1,199 @@
+//! `manifest.json`: what a folder of lightmaps holds, for programs that load it.
+//!
+//! Schema 1. Texture coordinates have v downwards from the first row of the image, as in glTF; `rectangles` are texels. It says
+//! nothing of time, machine or threads: the same scene and options give the same bytes.
+
+use super::atlas::{Atlas, Rectangle};
+use super::target::{Quantity, Target};
+use luxel_scenes::{Scene, UnitSystem};
+use luxel_solver::solvers::Ledger;
+use serde::Serialize;
+
+/// The folder's content.
+#[derive(Clone, Debug, Serialize)]
+pub struct Manifest {
+    /// Version of this schema.
+    pub schema: u32,
+    /// The program and its version.
+    pub software: String,
+    /// Name of the scene.
+    pub scene: String,
+    /// Which light the maps hold: `all`, `direct` or `indirect`.
+    pub include: String,
+    /// What a texel holds.
+    pub units: Units,
+    /// Factor from what is seen, L = ρE/π, to display values of 0 to 1, as in the preview.
+    pub exposure: f64,
+    /// The maps.
+    pub pages: Vec<Page>,
+    /// How the scene is sampled.
+    pub atlas: Sampling,
+    /// Every object with the place that it has.
+    pub objects: Vec<Placed>,
+    /// Files of the scene with its lightmap coordinates.
+    pub files: Files,
+    /// Numbers that Bevy wants.
+    pub bevy: Option<Bevy>,
+    /// Errors relative to the mean of the luxels, one standard deviation.
+    pub error: Error,
+    /// Where the flux goes, in W (lm) by channel; `None` for direct light alone.
+    pub energy: Option<Energy>,
+    /// Patches of the radiosity solution.
+    pub patches: usize,
+    /// Seed of all randomness.
+    pub seed: u64,
+}
+
+/// What a texel holds.
+#[derive(Clone, Debug, Serialize)]
+pub struct Units {
+    /// `irradiance` E, or `white-radiance` E/π.
+    pub quantity: Quantity,
+    /// Unit of E: `W/m2` or `lx`.
+    pub unit: &'static str,
+    /// Factor from E to the texel.
+    pub factor: f64,
+    /// Always linear.
+    pub colour_space: &'static str,
+    /// Whom the maps are for.
+    pub target: Target,
+}
+
+/// A map.
+#[derive(Clone, Debug, Serialize)]
+pub struct Page {
+    /// What the engine loads.
+    pub file: String,
+    /// Standard error of its texels, in their unit.
+    pub error: String,
+    /// What was gathered (E), before anything was filled or filtered, black where nothing was, with its standard error in
+    /// the layer `error`.
+    pub luxels: String,
+    /// Width in texels.
+    pub width: usize,
+    /// Height in texels.
+    pub height: usize,
+}
+
+/// How the scene is sampled.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Sampling {
+    /// Texels a metre, the root mean square over all surfaces.
+    pub texels_per_metre: f64,
+    /// Share of the texels that surfaces lie on.
+    pub utilisation: f64,
+    /// Number of charts.
+    pub charts: usize,
+    /// Texels around each.
+    pub padding: usize,
+    /// Texels whose light was gathered.
+    pub lit: usize,
+    /// Texels of surfaces that lie inside solids.
+    pub buried: usize,
+}
+
+/// An object's place.
+#[derive(Clone, Debug, Serialize)]
+pub struct Placed {
+    /// Its name in the scene.
+    pub name: String,
+    /// Its area in m².
+    pub area: f64,
+    /// Texels a metre.
+    pub texels_per_metre: f64,
+    /// The texels that it lies on, a rectangle a page.
+    pub rectangles: Vec<Rectangle>,
+}
+
+/// Files beside the maps.
+#[derive(Clone, Debug, Serialize)]
+pub struct Files {
+    /// The scene as binary glTF with the lightmap's coordinates in `TEXCOORD_1`.
+    pub glb: String,
+    /// The scene as OBJ, whose `vt` are the lightmap's.
+    pub obj: String,
+    /// The scene as it looks with the maps.
+    pub preview: String,
+    /// The charts.
+    pub atlas: String,
+}
+
+/// Numbers that Bevy wants.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Bevy {
+    /// `StandardMaterial::lightmap_exposure`.
+    pub lightmap_exposure: f64,
+}
+
+/// Relative errors.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Error {
+    /// Of the light at luxels: what `--error` asks for.
+    pub luxels: f64,
+    /// What filtering leaves between them.
+    pub filtering: f64,
+    /// Both.
+    pub total: f64,
+}
+
+/// Where the flux goes.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Energy {
+    /// Sent out by surfaces and lights, as far as it arrives.
+    pub emitted: [f64; 3],
+    /// Absorbed by surfaces.
+    pub absorbed: [f64; 3],
+    /// Left the scene.
+    pub escaped: [f64; 3],
+    /// What solver and form factors leave.
+    pub residual: [f64; 3],
+}
+
+impl From<Ledger> for Energy {
+    fn from(ledger: Ledger) -> Self {
+        Self {
+            emitted: (ledger.emitted.0 + ledger.direct.0).to_array(),
+            absorbed: ledger.absorbed.0.to_array(),
+            escaped: ledger.escaped.0.to_array(),
+            residual: (ledger.residual.0 + ledger.defect.0).to_array(),
+        }
+    }
+}
+
+/// Exposure of Bevy's default camera: 2^−EV100 / 1.2 with EV100 = 9.7 (`bevy_camera`, `Exposure::EV100_BLENDER`).
+fn bevy_view_exposure() -> f64 {
+    (-9.7_f64).exp2() / 1.2
+}
+
+impl Bevy {
+    /// With light in lx, texels of E/π are cd/m² as Bevy's lights are. Light in W/m² has no brightness to an eye: it is shown as
+    /// the preview shows it.
+    pub fn new(units: UnitSystem, exposure: f64) -> Self {
+        Self {
+            lightmap_exposure: match units {
+                UnitSystem::Photometric => 1.0,
+                UnitSystem::Radiometric => exposure / bevy_view_exposure(),
+            },
+        }
+    }
+}
+
+/// The places of all objects that have faces.
+pub fn objects(scene: &Scene, atlas: &Atlas) -> Vec<Placed> {
+    let mut areas = vec![0.0; scene.objects.len()];
+    for face in scene.face_ids() {
+        areas[scene.faces[face.index()].object.index()] += scene.area(face);
+    }
+    let texels = atlas.object_texels(scene);
+    let rectangles = atlas.rectangles(scene);
+    let objects = scene.objects.iter().zip(&areas).zip(texels).zip(rectangles);
+    objects
+        .filter(|(((_, area), _), _)| **area > 0.0)
+        .map(|(((object, &area), texels), rectangles)| Placed {
+            name: object.name.clone(),
+            area,
+            texels_per_metre: (texels / area).sqrt(),
+            rectangles,
+        })
+        .collect()
+}
