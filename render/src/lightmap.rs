@@ -8,6 +8,7 @@
 pub mod atlas;
 pub mod bake;
 pub mod dilation;
+pub mod export;
 pub mod lookup;
 pub mod luxels;
 pub mod map;

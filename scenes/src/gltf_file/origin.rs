@@ -92,10 +92,9 @@ fn json(file: &Path, bytes: Vec<u8>) -> Result<Vec<u8>, LoadError> {
     if !bytes.starts_with(b"glTF") {
         return Ok(bytes);
     }
-    let container =
-        gltf::Glb::from_slice(&bytes).map_err(|source| super::GltfError::Document {
-            file: file.to_owned(),
-            source: Box::new(source),
-        })?;
+    let container = gltf::Glb::from_slice(&bytes).map_err(|source| super::GltfError::Document {
+        file: file.to_owned(),
+        source: Box::new(source),
+    })?;
     Ok(container.json.into_owned())
 }

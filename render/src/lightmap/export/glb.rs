@@ -65,7 +65,9 @@ pub enum GlbError {
         source: image::ImageError,
     },
     /// Fewer file names than pages.
-    #[error("the lightmap has {pages} page(s), but {maps} file name(s) are given; name a file for each page")]
+    #[error(
+        "the lightmap has {pages} page(s), but {maps} file name(s) are given; name a file for each page"
+    )]
     Maps {
         /// Pages of the lightmap.
         pages: usize,
@@ -73,7 +75,9 @@ pub enum GlbError {
         maps: usize,
     },
     /// The container counts its bytes in 32 bits.
-    #[error("the scene takes {0} bytes, and a GLB file holds less than 4 GiB; bake it in parts or write OBJ")]
+    #[error(
+        "the scene takes {0} bytes, and a GLB file holds less than 4 GiB; bake it in parts or write OBJ"
+    )]
     TooLarge(usize),
     /// The document cannot be written as JSON.
     #[error("the document cannot be written: {0}")]

@@ -139,10 +139,7 @@ impl<'s> Writer<'s> {
     fn normal(&mut self, corner: usize) -> usize {
         let normal = self.scene.corners.normal[corner].to_array();
         let next = self.normals.len() + 1;
-        let number = *self
-            .normals
-            .entry(normal.map(f32::to_bits))
-            .or_insert(next);
+        let number = *self.normals.entry(normal.map(f32::to_bits)).or_insert(next);
         if number == next {
             let [x, y, z] = normal;
             self.line(format_args!("vn {x} {y} {z}"));
@@ -177,7 +174,9 @@ fn file_of<'s>(scene: &'s Scene, material: &Material) -> Option<&'s Texture> {
     let texture = &scene.textures[material.reflectance_texture?.index()];
     let extension = std::path::Path::new(&texture.name).extension()?;
     let known = ["png", "jpg", "jpeg", "tga", "hdr"];
-    let is_known = known.iter().any(|known| extension.eq_ignore_ascii_case(known));
+    let is_known = known
+        .iter()
+        .any(|known| extension.eq_ignore_ascii_case(known));
     is_known.then_some(texture)
 }
 

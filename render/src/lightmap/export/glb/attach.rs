@@ -44,6 +44,7 @@ pub(super) fn attach(
                 mark(primitive, extras.as_ref());
             }
         }
+        mark(&mut document.items_mut("nodes")[node], None);
         let primitives: Vec<Value> = parts.into_iter().flat_map(|p| p.primitives).collect();
         let mesh = add_mesh(document, &members, &mut slot, primitives);
         set(&mut document.items_mut("nodes")[node], "mesh", mesh);
@@ -55,9 +56,7 @@ pub(super) fn attach(
     if is_only {
         own = document.items("nodes")[node].clone();
     }
-    if parts.is_empty() {
-        object_mut(&mut own).remove("skin");
-    }
+    mark(&mut own, None);
     for part in parts {
         let extras = extras(baked, &part);
         let mut members = members.clone();
@@ -121,6 +120,10 @@ fn extras(baked: Baked, part: &Part) -> Option<Value> {
 /// Adds to the extras of a node or primitive, of which any JSON value is allowed: what is not an object becomes a member.
 fn mark(item: &mut Value, lightmap: Option<&Value>) {
     let Some(lightmap) = lightmap else {
+        // What an earlier bake of the same file said no longer holds.
+        if let Some(extras) = item.get_mut("extras").filter(|extras| extras.is_object()) {
+            object_mut(extras).remove("luxel_lightmap");
+        }
         return;
     };
     let extras = child_mut(item, "extras");

@@ -83,7 +83,9 @@ impl Document {
         text.resize(text.len().next_multiple_of(4), b' ');
 
         let chunks = [(b"JSON", &text), (b"BIN\0", &self.binary)];
-        let chunks = chunks.into_iter().filter(|(_, content)| !content.is_empty());
+        let chunks = chunks
+            .into_iter()
+            .filter(|(_, content)| !content.is_empty());
         let total = 12 + chunks.clone().map(|(_, c)| 8 + c.len()).sum::<usize>();
         let word = |x: usize| u32::try_from(x).map(u32::to_le_bytes);
         let Ok(length) = word(total) else {

@@ -51,7 +51,10 @@ impl Attribute {
             let places = items(document, places, width, count)?;
             let values = items(document, values, size, count)?;
             for (place, value) in places.chunks_exact(width).zip(values.chunks_exact(size)) {
-                let place = place.iter().rev().fold(0, |sum, &byte| sum << 8 | usize::from(byte));
+                let place = place
+                    .iter()
+                    .rev()
+                    .fold(0, |sum, &byte| sum << 8 | usize::from(byte));
                 let start = place.checked_mul(size)?;
                 data.get_mut(start..start.checked_add(size)?)?
                     .copy_from_slice(value);
@@ -196,13 +199,13 @@ fn component_size(kind: usize) -> Option<usize> {
 
 /// The value of a component.
 fn component(kind: usize, bytes: &[u8]) -> Option<f64> {
-    Some(match (kind, *bytes) {
-        (5120, [a]) => f64::from(i8::from_le_bytes([a])),
-        (5121, [a]) => f64::from(a),
-        (5122, [a, b]) => f64::from(i16::from_le_bytes([a, b])),
-        (5123, [a, b]) => f64::from(u16::from_le_bytes([a, b])),
-        (5125, [a, b, c, d]) => f64::from(u32::from_le_bytes([a, b, c, d])),
-        (FLOAT, [a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
+    Some(match (kind, bytes) {
+        (5120, &[a]) => f64::from(i8::from_le_bytes([a])),
+        (5121, &[a]) => f64::from(a),
+        (5122, &[a, b]) => f64::from(i16::from_le_bytes([a, b])),
+        (5123, &[a, b]) => f64::from(u16::from_le_bytes([a, b])),
+        (5125, &[a, b, c, d]) => f64::from(u32::from_le_bytes([a, b, c, d])),
+        (FLOAT, &[a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
         _ => return None,
     })
 }
