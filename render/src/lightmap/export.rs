@@ -6,3 +6,6 @@
 pub mod glb;
 pub mod obj;
 mod pages;
+
+#[cfg(test)]
+mod testing;
