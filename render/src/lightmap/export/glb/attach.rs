@@ -117,18 +117,14 @@ fn extras(baked: Baked, part: &Part) -> Option<Value> {
     }))
 }
 
-/// Adds to the extras of a node or primitive, of which any JSON value is allowed: what is not an object becomes a member.
+/// Adds to the extras of a node or primitive, or takes out what an earlier bake of the same file said.
 fn mark(item: &mut Value, lightmap: Option<&Value>) {
     let Some(lightmap) = lightmap else {
-        // What an earlier bake of the same file said no longer holds.
         if let Some(extras) = item.get_mut("extras").filter(|extras| extras.is_object()) {
             object_mut(extras).remove("luxel_lightmap");
         }
         return;
     };
     let extras = child_mut(item, "extras");
-    if !extras.is_object() {
-        *extras = json!({"extras": extras.take()});
-    }
     set(extras, "luxel_lightmap", lightmap.clone());
 }

@@ -176,9 +176,8 @@ fn nodes_on_several_pages_have_a_child_for_each() {
     assert!((area(&scene) / area(&again) - 1.0).abs() < 1e-5);
 
     let loaded = pavilion();
-    let mut scene = loaded.scene;
-    // Names that are theirs alone tell the nodes apart.
-    let atlas = pages(&scene, 16.0, 80);
+    let scene = loaded.scene;
+    let atlas = pages(&scene, 16.0, 128);
     assert!(atlas.pages > 1);
     let file = glb(&scene, loaded.origin.as_ref(), &atlas, &maps(&atlas)).expect("it is written");
     let again = reloaded("a.glb", &[("a.glb", &file)]).scene;
@@ -195,7 +194,6 @@ fn nodes_on_several_pages_have_a_child_for_each() {
         let child = &document["nodes"][child.as_u64().expect("a number") as usize];
         assert_eq!(child["extras"]["luxel_lightmap"]["texCoord"], 1);
     }
-    scene.name.clear();
 }
 
 #[test]
@@ -304,7 +302,9 @@ fn polygons_and_distant_objects_keep_their_shape() {
     let again = reloaded("a.glb", &[("a.glb", &file)]).scene;
     assert_eq!(again.faces.len(), 3);
     assert!((area(&again) - 1.25).abs() < 1e-6);
-    assert_eq!(again.materials[0].emission.0, DVec3::new(0.5, 0.25, 3.0));
+    // Factor and strength are rounded to f32.
+    let off = again.materials[0].emission.0 - DVec3::new(0.5, 0.25, 3.0);
+    assert!(off.abs().max_element() < 3.0 * f64::from(f32::EPSILON));
 }
 
 #[test]

@@ -20,7 +20,7 @@ fn document() -> (Value, Vec<u8>) {
         "extensionsUsed": ["VENDOR_unknown"],
         "extensions": {"VENDOR_unknown": {"deep": [1, {"a": null}]}},
         "scene": 0, "scenes": [{"nodes": [0]}],
-        "nodes": [{"name": "n", "mesh": 0, "extras": "text"}],
+        "nodes": [{"name": "n", "mesh": 0, "extras": {"n": "text"}}],
         "meshes": [{"name": "m", "extras": {"mesh": 1}, "primitives": [
             {"attributes": {"POSITION": 0, "TEXCOORD_0": 1, "TEXCOORD_1": 4, "COLOR_0": 2}, "mode": 5, "extras": {"p": 2}},
             {"attributes": {"POSITION": 0}, "mode": 3}]}],
@@ -28,7 +28,7 @@ fn document() -> (Value, Vec<u8>) {
             {"buffer": 0, "byteOffset": 0, "byteLength": 48},
             {"buffer": 0, "byteOffset": 48, "byteLength": 48},
             {"buffer": 0, "byteOffset": 96, "byteLength": 32},
-            {"buffer": 0, "byteOffset": 128, "byteLength": 12, "byteStride": 3},
+            {"buffer": 0, "byteOffset": 128, "byteLength": 12},
             {"buffer": 0, "byteOffset": 140, "byteLength": 1},
             {"buffer": 0, "byteOffset": 144, "byteLength": 8}],
         "accessors": [
@@ -46,7 +46,7 @@ fn document() -> (Value, Vec<u8>) {
 fn written(document: &Value, bytes: &[u8], pages: &[Option<u32>]) -> (Value, Vec<u8>, Scene) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("a.glb");
-    let made = super::super::document::Document {
+    let made = document::Document {
         root: document.clone(),
         binary: bytes.to_vec(),
     };
@@ -89,7 +89,7 @@ fn strips_become_triangles_and_lines_stay() {
     // (0, 1.5) to (5, 1.5) of 8 × 16 texels.
     let rect = &lit["extras"]["luxel_lightmap"]["rect"];
     assert_eq!(*rect, json!({"min": [0.0, 0.0625], "max": [0.625, 0.125]}));
-    assert_eq!(nodes[0]["extras"], "text");
+    assert_eq!(nodes[0]["extras"], json!({"n": "text"}));
     let mesh = &written["meshes"][lit["mesh"].as_u64().expect("a mesh") as usize];
     assert_eq!(mesh["extras"]["mesh"], 1);
     let primitive = &mesh["primitives"][0];
@@ -153,7 +153,7 @@ fn faces_without_a_lightmap_stand_apart() {
     let (written, _, _) = written(&document, &bytes, &[None, None]);
     let nodes = items(&written, "nodes");
     assert_eq!(nodes.len(), 1);
-    assert_eq!(nodes[0]["extras"], "text");
+    assert_eq!(nodes[0]["extras"], json!({"n": "text"}));
     let primitive = &written["meshes"][0]["primitives"][0];
     assert!(
         primitive["attributes"].get("TEXCOORD_1").is_some(),
@@ -164,7 +164,7 @@ fn faces_without_a_lightmap_stand_apart() {
 #[test]
 fn a_second_bake_replaces_the_first() {
     let loaded = pavilion();
-    let first_atlas = pages(&loaded.scene, 16.0, 80);
+    let first_atlas = pages(&loaded.scene, 16.0, 128);
     let first = glb(
         &loaded.scene,
         loaded.origin.as_ref(),
