@@ -98,3 +98,87 @@ fn json(file: &Path, bytes: Vec<u8>) -> Result<Vec<u8>, LoadError> {
     })?;
     Ok(container.json.into_owned())
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::load::{Loaded, load};
+    use std::path::PathBuf;
+
+    fn data(scene: &str, file: &str) -> PathBuf {
+        let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("data");
+        folder.join(scene).join(file)
+    }
+
+    /// What a scene file beside nothing else gives.
+    fn scene(text: &str) -> Loaded {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let file = folder.path().join("a.toml");
+        std::fs::write(&file, text).expect("the file is written");
+        load(&file).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    #[test]
+    fn each_vertex_has_a_place_in_the_file() {
+        let loaded = load(data("pavilion", "pavilion.gltf")).expect("the scene is valid");
+        let origin = loaded.origin.expect("one file");
+        assert_eq!(origin.runs.len(), 9, "eight nodes, one with two primitives");
+        assert_eq!((origin.lights, origin.cameras), (3, 1));
+        let mut next = 0;
+        for run in &origin.runs {
+            assert_eq!(run.vertices.start, next);
+            next = run.vertices.end;
+        }
+        assert_eq!(next as usize, loaded.scene.vertices.len());
+        for corner in loaded.scene.corners.vertex {
+            let (run, number) = origin.find(corner).expect("all are from the file");
+            assert_eq!(origin.runs[run].vertices.start + number, corner);
+        }
+        assert_eq!(origin.find(next), None);
+        let mirrored = origin.runs.iter().filter(|run| run.is_mirrored);
+        assert_eq!(mirrored.count(), 1);
+    }
+
+    #[test]
+    fn the_file_can_be_read_again() {
+        let loaded = load(data("pavilion", "pavilion.gltf")).expect("the scene is valid");
+        let bytes = loaded
+            .origin
+            .expect("one file")
+            .read()
+            .expect("it is still there");
+        let file = |name| std::fs::read(data("pavilion", name)).expect("it is there");
+        assert_eq!(bytes.json, file("pavilion.gltf"));
+        assert_eq!(bytes.buffers, [file("pavilion.bin")]);
+        assert_eq!(bytes.images[0], Some(file("tile.png")));
+        let data = bytes.images[1].as_ref().expect("a data URI");
+        assert!(data.starts_with(b"\x89PNG"));
+    }
+
+    #[test]
+    fn several_sources_have_no_origin() {
+        let pavilion = data("pavilion", "pavilion.gltf");
+        let cornell = data("cornell", "cornell.obj");
+        let one = scene(&format!(
+            "geometry = [{pavilion:?}]\n[scene]\nscale = 2\n[material.wood]\nreflectance = 0.5"
+        ));
+        let origin = one.origin.expect("one file");
+        assert_eq!(origin.scale, 2.0);
+        let changed: Vec<&str> = origin
+            .changed
+            .iter()
+            .map(|id| one.scene.materials[id.index()].name.as_str())
+            .collect();
+        assert_eq!(changed, ["wood"]);
+        for text in [
+            format!("geometry = [{pavilion:?}, {pavilion:?}]"),
+            format!("geometry = [{pavilion:?}, {cornell:?}]"),
+            format!("geometry = [{cornell:?}, {pavilion:?}]"),
+            format!("geometry = [{cornell:?}]"),
+            format!(
+                "geometry = [{pavilion:?}]\n[[polygon]]\nmaterial = \"wood\"\nvertices = [[0,0,9],[1,0,9],[0,1,9]]"
+            ),
+        ] {
+            assert_eq!(scene(&text).origin, None, "{text}");
+        }
+    }
+}

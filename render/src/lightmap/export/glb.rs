@@ -39,7 +39,7 @@ mod views;
 
 use super::pages::Pages;
 use crate::lightmap::atlas::Atlas;
-use luxel_scenes::{GltfOrigin, LoadError, Scene};
+use luxel_scenes::{GltfOrigin, LoadError, Scene, UnitSystem};
 use std::path::PathBuf;
 
 /// Why a scene cannot be written as binary glTF.
@@ -55,6 +55,19 @@ pub enum GlbError {
         file: PathBuf,
         /// What is not as it was.
         what: String,
+    },
+    /// An attribute that rendering does not need is not as the format says.
+    #[error(
+        "{}: {attribute} of the mesh of node {node} has not one readable value for each vertex; export the file again",
+        file.display()
+    )]
+    Attribute {
+        /// The file.
+        file: PathBuf,
+        /// The node's index in the document.
+        node: usize,
+        /// The attribute, such as COLOR_0.
+        attribute: String,
     },
     /// An image could not be encoded.
     #[error("texture `{name}` cannot be written as PNG: {source}")]
@@ -125,6 +138,14 @@ pub fn glb(
         None => made::document(baked)?,
     };
     document.into_glb()
+}
+
+/// What the scene counts light in, for the extras of the document: glTF itself knows lumens only.
+fn units(scene: &Scene) -> &'static str {
+    match scene.units {
+        UnitSystem::Radiometric => "radiometric",
+        UnitSystem::Photometric => "photometric",
+    }
 }
 
 #[cfg(test)]

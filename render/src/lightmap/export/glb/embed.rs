@@ -39,7 +39,8 @@ pub(super) fn document(
     for view in document.items_mut("bufferViews") {
         let start = index(view, "buffer").and_then(|buffer| starts.get(buffer));
         let start = start.ok_or_else(|| changed("a buffer view has no buffer"))?;
-        let offset = start + index(view, "byteOffset").unwrap_or(0);
+        // One beyond all bytes stays there: the reader did not need it.
+        let offset = start.saturating_add(index(view, "byteOffset").unwrap_or(0));
         set(view, "buffer", 0);
         set(view, "byteOffset", offset);
         uncompress(view);

@@ -8,9 +8,9 @@ use super::attach::{Mesh, Part, attach};
 use super::document::{Document, set};
 use super::surfaces::Surfaces;
 use super::vertices::{Attribute, write_indices};
-use super::{Baked, GlbError, views};
+use super::{Baked, GlbError, units, views};
 use glam::{DVec3, Vec2};
-use luxel_scenes::{FaceId, MaterialId, ObjectId, UnitSystem};
+use luxel_scenes::{FaceId, MaterialId, ObjectId};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, HashMap};
 
@@ -20,13 +20,9 @@ type Groups = BTreeMap<Option<u32>, BTreeMap<MaterialId, Vec<FaceId>>>;
 /// The document of a scene.
 pub(super) fn document(baked: Baked) -> Result<Document, GlbError> {
     let scene = baked.scene;
-    let units = match scene.units {
-        UnitSystem::Radiometric => "radiometric",
-        UnitSystem::Photometric => "photometric",
-    };
     let mut document = Document {
         root: json!({
-            "asset": {"version": "2.0", "generator": "luxel", "extras": {"luxel_units": units}},
+            "asset": {"version": "2.0", "generator": "luxel", "extras": {"luxel_units": units(scene)}},
             "scene": 0,
         }),
         binary: Vec::new(),

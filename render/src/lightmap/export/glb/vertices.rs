@@ -34,11 +34,13 @@ impl Attribute {
         }
     }
 
-    /// Reads an accessor; `None` when it is not as the format says.
-    pub(super) fn read(document: &Document, accessor: usize) -> Option<Self> {
+    /// Reads an accessor of so many items; `None` when it is not as the format says.
+    pub(super) fn read(document: &Document, accessor: usize, count: usize) -> Option<Self> {
         let accessor = document.items("accessors").get(accessor)?;
         let size = item_size(accessor)?;
-        let count = index(accessor, "count")?;
+        if index(accessor, "count")? != count {
+            return None;
+        }
         let view = accessor.get("bufferView");
         let mut data = match view {
             Some(_) => items(document, accessor, size, count)?,
@@ -71,18 +73,21 @@ impl Attribute {
         })
     }
 
-    /// Some of its items, by number; `None` when there are not so many.
-    pub(super) fn pick(&self, numbers: &[u32]) -> Option<Self> {
+    /// Some of its items, by number.
+    ///
+    /// # Panics
+    /// When there are not so many.
+    pub(super) fn pick(&self, numbers: &[u32]) -> Self {
         let mut data = Vec::with_capacity(numbers.len() * self.size);
         for &number in numbers {
             let start = number as usize * self.size;
-            data.extend_from_slice(self.data.get(start..start + self.size)?);
+            data.extend_from_slice(&self.data[start..start + self.size]);
         }
-        Some(Self {
+        Self {
             accessor: self.accessor.clone(),
             size: self.size,
             data,
-        })
+        }
     }
 
     /// Adds it to a document as a view and an accessor of its own; `is_bounded` for positions, of which the format wants

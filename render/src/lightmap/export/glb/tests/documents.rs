@@ -43,7 +43,7 @@ fn document() -> (Value, Vec<u8>) {
     (document, bytes)
 }
 
-fn written(document: &Value, bytes: &[u8], pages: &[Option<u32>]) -> (Value, Vec<u8>, Scene) {
+fn try_written(document: &Value, bytes: &[u8], pages: &[Option<u32>]) -> Result<Vec<u8>, GlbError> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("a.glb");
     let made = document::Document {
@@ -58,17 +58,22 @@ fn written(document: &Value, bytes: &[u8], pages: &[Option<u32>]) -> (Value, Vec
         page: page.unwrap_or(0),
         object: ObjectId(0),
     };
+    let face_chart = (0_u32..)
+        .zip(pages)
+        .map(|(i, page)| page.map(|_| ChartId(i)));
     let atlas = Atlas {
         size: [8, 16],
         pages: 2,
         corners: (0_u8..6).map(|i| DVec2::new(f64::from(i), 1.5)).collect(),
-        face_chart: (0..2)
-            .map(|i| pages[i as usize].map(|_| ChartId(i)))
-            .collect(),
+        face_chart: face_chart.collect(),
         charts: pages.iter().map(chart).collect(),
         padding: 1,
     };
-    let file = glb(scene, loaded.origin.as_ref(), &atlas, &maps(&atlas)).expect("it is written");
+    glb(scene, loaded.origin.as_ref(), &atlas, &maps(&atlas))
+}
+
+fn written(document: &Value, bytes: &[u8], pages: &[Option<u32>]) -> (Value, Vec<u8>, Scene) {
+    let file = try_written(document, bytes, pages).expect("it is written");
     let again = reloaded("a.glb", &[("a.glb", &file)]).scene;
     let (document, binary) = parts(&file);
     (document, binary, again)
@@ -159,6 +164,15 @@ fn faces_without_a_lightmap_stand_apart() {
         primitive["attributes"].get("TEXCOORD_1").is_some(),
         "its own set stays"
     );
+}
+
+#[test]
+fn an_attribute_that_cannot_be_copied_is_named() {
+    let (mut document, bytes) = document();
+    document["accessors"][2]["count"] = 3.into();
+    let error = try_written(&document, &bytes, &[Some(0), Some(0)]);
+    let error = error.expect_err("a colour is missing").to_string();
+    assert!(error.contains("COLOR_0 of the mesh of node 0"), "{error}");
 }
 
 #[test]
