@@ -16,7 +16,7 @@ use crate::lightmap::atlas::Atlas;
 use luxel_scenes::material::Wrap;
 use luxel_scenes::{FaceId, Material, MaterialId, ObjectId, Scene, Texture};
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::io::Write as _;
+use std::fmt::Write as _;
 
 /// The bytes of an OBJ file and of the material library that it names `mtl_name`.
 ///
@@ -49,14 +49,14 @@ pub fn obj(scene: &Scene, atlas: &Atlas, mtl_name: &str) -> (Vec<u8>, Vec<u8>) {
             writer.face(face, page.is_some());
         }
     }
-    (writer.text, library(scene, &materials))
+    (writer.text.into_bytes(), library(scene, &materials))
 }
 
 /// A file that is being written.
 struct Writer<'s> {
     scene: &'s Scene,
     atlas: &'s Atlas,
-    text: Vec<u8>,
+    text: String,
     /// Number of each vertex in the file, from one; zero for those that are not written yet.
     vertices: Vec<usize>,
     written: usize,
@@ -69,7 +69,7 @@ impl<'s> Writer<'s> {
         Self {
             scene,
             atlas,
-            text: Vec::new(),
+            text: String::new(),
             vertices: vec![0; scene.vertices.len()],
             written: 0,
             coordinates: HashMap::new(),
@@ -78,7 +78,7 @@ impl<'s> Writer<'s> {
     }
 
     fn line(&mut self, line: std::fmt::Arguments) {
-        // Writing to memory does not fail.
+        // Writing to a string does not fail.
         let _ = writeln!(self.text, "{line}");
     }
 
@@ -102,11 +102,12 @@ impl<'s> Writer<'s> {
             let vertex = self.vertex(self.scene.corners.vertex[corner] as usize);
             let place = has_place.then(|| self.coordinate(corner));
             let normal = has_normals.then(|| self.normal(corner));
-            line += &match (place, normal) {
-                (Some(place), Some(normal)) => format!(" {vertex}/{place}/{normal}"),
-                (Some(place), None) => format!(" {vertex}/{place}"),
-                (None, Some(normal)) => format!(" {vertex}//{normal}"),
-                (None, None) => format!(" {vertex}"),
+            // Writing to a string does not fail.
+            let _ = match (place, normal) {
+                (Some(place), Some(normal)) => write!(line, " {vertex}/{place}/{normal}"),
+                (Some(place), None) => write!(line, " {vertex}/{place}"),
+                (None, Some(normal)) => write!(line, " {vertex}//{normal}"),
+                (None, None) => write!(line, " {vertex}"),
             };
         }
         self.line(format_args!("{line}"));
@@ -150,23 +151,25 @@ impl<'s> Writer<'s> {
 
 /// The material library.
 fn library(scene: &Scene, names: &[String]) -> Vec<u8> {
-    let mut text = String::from(
-        "# luxel: Kd is the diffuse reflectance, Ke the emitted radiance; images of map_Kd are not addressed by vt\n",
-    );
+    let mut lines = vec![
+        "# luxel: Kd is the diffuse reflectance, Ke the emitted radiance; images of map_Kd are not addressed by vt".to_owned(),
+    ];
     for (material, name) in scene.materials.iter().zip(names) {
         let [kd, ke] = [material.reflectance.0, material.emission.0];
-        text += &format!("newmtl {name}\nKd {} {} {}\n", kd.x, kd.y, kd.z);
-        text += &format!("Ke {} {} {}\n", ke.x, ke.y, ke.z);
+        lines.push(format!("newmtl {name}"));
+        lines.push(format!("Kd {} {} {}", kd.x, kd.y, kd.z));
+        lines.push(format!("Ke {} {} {}", ke.x, ke.y, ke.z));
         if let Some(texture) = file_of(scene, material) {
             let clamp = match texture.wrap {
                 Wrap::Clamp => "-clamp on ",
                 Wrap::Repeat | Wrap::Mirror => "",
             };
             let name = printable(&texture.name.replace('\\', "/"));
-            text += &format!("map_Kd {clamp}{name}\n");
+            lines.push(format!("map_Kd {clamp}{name}"));
         }
     }
-    text.into_bytes()
+    lines.push(String::new());
+    lines.join("\n").into_bytes()
 }
 
 /// The reflectance texture of a material when it was a file, which its name tells by the extension.

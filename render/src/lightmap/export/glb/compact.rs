@@ -72,7 +72,7 @@ fn items<'v>(value: &'v mut Value, key: &str) -> impl Iterator<Item = &'v mut Va
     items.into_iter().flatten()
 }
 
-fn members<'v>(value: &'v mut Value) -> impl Iterator<Item = &'v mut Value> {
+fn members(value: &mut Value) -> impl Iterator<Item = &mut Value> {
     let members = value.as_object_mut();
     members.into_iter().flatten().map(|(_, member)| member)
 }

@@ -103,15 +103,6 @@ impl<'s> Surfaces<'s> {
         Ok(index)
     }
 
-    /// Gives a material of the document the factors and sides that a scene file gave it; textures stay.
-    pub(super) fn change(&self, document: &mut Document, index: usize, material: &Material) {
-        let mut value = document.items("materials")[index].clone();
-        colour(&mut value, material, 1.0);
-        emit(document, &mut value, material.emission.0);
-        sides(&mut value, material);
-        document.items_mut("materials")[index] = value;
-    }
-
     fn texture(&mut self, document: &mut Document, id: TextureId) -> Result<Written, GlbError> {
         if let Some(written) = self.textures[id.index()] {
             return Ok(written);
@@ -164,6 +155,15 @@ impl<'s> Surfaces<'s> {
         self.textures[id.index()] = Some(written);
         Ok(written)
     }
+}
+
+/// Gives a material of the document the factors and sides that a scene file gave it; textures stay.
+pub(super) fn change(document: &mut Document, index: usize, material: &Material) {
+    let mut value = document.items("materials")[index].clone();
+    colour(&mut value, material, 1.0);
+    emit(document, &mut value, material.emission.0);
+    sides(&mut value, material);
+    document.items_mut("materials")[index] = value;
 }
 
 /// Sets the base colour, of which opacity stays as it is.

@@ -143,12 +143,11 @@ pub(super) fn add_changes(document: &mut Document, scene: &Scene, origin: &GltfO
     roots.extend(added.into_iter().map(Value::from));
     let number = default_scene(document);
     let scenes = document.items_mut("scenes");
-    match scenes.get_mut(number) {
-        Some(scene) => set(scene, "nodes", roots),
-        None => {
-            scenes.push(json!({"nodes": roots}));
-            set(&mut document.root, "scene", 0);
-        }
+    if let Some(scene) = scenes.get_mut(number) {
+        set(scene, "nodes", roots);
+    } else {
+        scenes.push(json!({"nodes": roots}));
+        set(&mut document.root, "scene", 0);
     }
 }
 

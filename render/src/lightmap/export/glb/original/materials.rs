@@ -4,7 +4,7 @@
 use super::{Groups, Source, primitives};
 use crate::lightmap::export::glb::GlbError;
 use crate::lightmap::export::glb::document::{Document, index};
-use crate::lightmap::export::glb::surfaces::Surfaces;
+use crate::lightmap::export::glb::surfaces::{self, Surfaces};
 use crate::lightmap::export::glb::texture_sets::{self, Uses};
 use luxel_scenes::{MaterialId, Scene};
 use serde_json::Value;
@@ -44,7 +44,7 @@ impl Materials {
             chosen.insert((run, id), material);
         }
         for &id in changed.iter().filter(|id| id.index() < count) {
-            surfaces.change(document, id.index(), &scene.materials[id.index()]);
+            surfaces::change(document, id.index(), &scene.materials[id.index()]);
         }
         let uses = uses(document, source, groups, &chosen);
         let moved = texture_sets::repoint(document, &uses);
