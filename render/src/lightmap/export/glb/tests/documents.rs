@@ -3,6 +3,7 @@
 use super::*;
 use crate::lightmap::atlas::{Chart, ChartId};
 use glam::DVec2;
+use proptest::prelude::*;
 use serde_json::json;
 
 /// A quad of a strip, and a line, in one mesh at one node.
@@ -198,5 +199,48 @@ fn a_second_bake_replaces_the_first() {
     for node in items(&document, "nodes") {
         let page = &node["extras"]["luxel_lightmap"]["page"];
         assert!(page.is_null() || *page == 0);
+    }
+}
+
+/// Places for any scene: one page and row a face, in turn.
+fn any_atlas(scene: &Scene) -> Atlas {
+    let faces = 0..scene.faces.len() as u32;
+    let chart = |face: u32| Chart {
+        page: face % 2,
+        object: scene.faces[face as usize].object,
+    };
+    let corners = 0..scene.corners.vertex.len();
+    Atlas {
+        size: [8, 8],
+        pages: 2,
+        corners: corners
+            .map(|i| DVec2::new((i % 7) as f64, (i % 5) as f64))
+            .collect(),
+        face_chart: faces.clone().map(|face| Some(ChartId(face))).collect(),
+        charts: faces.map(chart).collect(),
+        padding: 1,
+    }
+}
+
+proptest! {
+    /// What the reader takes is written, or refused with a message.
+    #[test]
+    fn no_document_makes_it_panic(at in 0.0..1.0_f64, character in "[0-9a-zA-Z_\\[\\]{},:\"-]{0,2}", targets: bool) {
+        let (mut document, bytes) = document();
+        if targets {
+            document["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": 3}]);
+        }
+        document["buffers"][0]["uri"] = "a.bin".into();
+        let mut text = document.to_string();
+        let at = (at * text.len() as f64) as usize;
+        text.replace_range(at..=at, &character);
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("a.gltf");
+        std::fs::write(folder.path().join("a.bin"), &bytes).expect("it is written");
+        std::fs::write(&path, text).expect("it is written");
+        if let Ok(loaded) = load(&path) {
+            let atlas = any_atlas(&loaded.scene);
+            let _ = glb(&loaded.scene, loaded.origin.as_ref(), &atlas, &maps(&atlas));
+        }
     }
 }
