@@ -124,6 +124,46 @@ impl Output {
     }
 }
 
+/// A folder that files are written to, each as by [`Output`].
+#[derive(Debug)]
+pub struct OutputFolder(PathBuf);
+
+impl OutputFolder {
+    /// Makes the folder, if it does not exist, and checks that files can be written to it.
+    ///
+    /// # Errors
+    /// When it cannot be made or written to, or is a file.
+    pub fn prepare(path: &Path) -> Result<Self, OutputError> {
+        fs::create_dir_all(path)
+            .map_err(|error| OutputError::Refused(path.to_path_buf(), error))?;
+        let folder = Self(path.to_path_buf());
+        Output::prepare(&path.join("manifest.json"))?;
+        Ok(folder)
+    }
+
+    /// Makes `bytes` the content of a file in it, at once.
+    ///
+    /// # Errors
+    /// As [`Output::prepare`] and [`Output::write`].
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
+        Output::prepare(&self.0.join(name))?.write(bytes)
+    }
+
+    /// Removes a file if it is there.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn remove(&self, name: &str) -> Result<(), OutputError> {
+        let path = self.0.join(name);
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(OutputError::Refused(path, error))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

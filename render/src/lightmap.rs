@@ -2,17 +2,19 @@
 //!
 //! The way of the light through this module: faces get places in pages ([`unwrap`], [`atlas`]), texels get points on
 //! them ([`luxels`]), the points become receivers ([`receivers`]), light is gathered there ([`bake`]), and what lies
-//! between and beside the charts is filled so that filtered look-ups are right ([`seams`], [`dilation`]). [`lookup`] is
-//! how an engine reads the result.
+//! between and beside the charts is filled ([`dilation`]) and fitted ([`fit`], [`seams`]) so that filtered look-ups are right.
+//! [`lookup`] is how an engine reads the result, [`view`] how it shows it, and [`mod@target`] what it wants texels to hold;
+//! [`export`] writes the scene with its new coordinates, [`manifest`] what is where.
 
 pub mod atlas;
 pub mod bake;
 pub mod dilation;
+pub mod export;
 pub mod fit;
 pub mod given;
 pub mod lookup;
-pub mod manifest;
 pub mod luxels;
+pub mod manifest;
 pub mod map;
 pub mod picture;
 pub mod receivers;

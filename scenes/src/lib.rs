@@ -29,6 +29,7 @@ pub mod sky;
 pub mod texture_file;
 
 pub use camera::{Camera, FieldOfView, Projection};
+pub use gltf_file::{GltfBytes, GltfOrigin};
 pub use id::{FaceId, MaterialId, ObjectId, TextureId};
 pub use light::{Light, LightKind};
 pub use load::{FailureKind, LoadError, Loaded, Warning, load};

@@ -1,30 +1,37 @@
 //! `luxel bake`: lightmaps.
 
+mod deliver;
+mod footprint;
+mod places;
+
 use super::exit::{ExitCode, Failure};
-use super::footprint::{Footprint, held_back, larger_error};
+use super::footprint::{Footprint, held_back};
 use super::memory;
 use super::scene;
 use super::stated::StatedError;
 use super::steering::{Steering, first_error};
 use super::{Context, Session};
-use crate::files::Output;
-use crate::image::exr::{self, Picture};
-use crate::integrators::{Samples, expose};
+use crate::files::OutputFolder;
 use crate::lightmap::atlas::Atlas;
 use crate::lightmap::bake::{self, BakeConfig, Luxels};
 use crate::lightmap::dilation::dilate;
+use crate::lightmap::fit::fit;
+use crate::lightmap::manifest;
 use crate::lightmap::map::Lightmap;
 use crate::lightmap::seams;
-use crate::lightmap::unwrap::{Density, UnwrapConfig, Unwrapper, UvUnwrap};
-use crate::lightmap::view::LightmapView;
-use crate::progress::{Progress, Silent};
+use crate::lightmap::target::Target;
+use clap::ValueEnum;
+use deliver::Delivery;
 use luxel_scenes::Scene;
-use luxel_solver::adaptive::{self, AdaptiveConfig, Ending};
+use luxel_solver::adaptive::{Adaptive, AdaptiveConfig, Ending};
 use luxel_solver::gather::Components;
 use luxel_solver::world::World;
 use std::path::PathBuf;
 
 /// Bake the light of a scene into textures
+///
+/// Writes a folder: the lightmaps as linear EXR, their standard error, the scene as glTF and OBJ with the lightmap's texture
+/// coordinates, manifest.json, which says what is where and in which unit, and pictures to look at.
 #[derive(clap::Args)]
 pub(super) struct Bake {
     /// Scene file (.toml), or geometry (.obj, .gltf, .glb)
@@ -34,211 +41,204 @@ pub(super) struct Bake {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 
-    /// Texels along each side of a page, a multiple of 4 [default: as many as 16 texels a metre need, 256 to 1024]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..=16384))]
-    size: Option<u32>,
+    /// Who is to show the maps: sets what a texel holds, and adds a file that shows how to load them
+    #[arg(long = "for", value_enum, default_value = "raw", value_name = "WHOM")]
+    target: Target,
+
+    /// Which light the maps hold
+    #[arg(long, value_enum, default_value = "all", value_name = "WHICH")]
+    include: Include,
+
+    /// Where texture coordinates come from
+    #[arg(long, value_enum, default_value = "auto", value_name = "WHENCE")]
+    uv: places::Whence,
+
+    /// Texels along each side of a page, a multiple of 4 [default: 256 to 1024, as 16 texels a metre need]
+    #[arg(long, value_name = "N", value_parser = places::parse_side)]
+    size: Option<usize>,
 
     /// Texels a metre, on as many pages as are needed [default: as fine as one page allows]
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "F", value_parser = places::parse_density)]
     texels_per_metre: Option<f64>,
 
     /// Texels around each chart: charts are at least twice as many apart
-    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=64))]
-    padding: u32,
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=64))]
+    padding: u8,
+
+    /// Give each chart blocks of 4 × 4 texels of its own, for block compression
+    #[arg(long)]
+    block_align: bool,
+
+    /// Share of a texel's rays that may meet backs of faces before it counts as lying inside a solid
+    #[arg(long, value_name = "SHARE", default_value_t = 0.5, value_parser = places::parse_share)]
+    backface_tolerance: f64,
+}
+
+/// Which light is baked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Include {
+    /// All
+    All,
+    /// Straight from a source
+    Direct,
+    /// After at least one reflection
+    Indirect,
+}
+
+impl From<Include> for Components {
+    fn from(include: Include) -> Self {
+        match include {
+            Include::All => Self::All,
+            Include::Direct => Self::Direct,
+            Include::Indirect => Self::Indirect,
+        }
+    }
+}
+
+/// A finished bake.
+struct Baked {
+    atlas: Atlas,
+    luxels: Luxels,
+    /// What was gathered, with nothing filled in.
+    raw: Lightmap,
+    /// What is delivered.
+    map: Lightmap,
+    error: manifest::Error,
+    adaptive: Adaptive,
 }
 
 impl Bake {
     pub(super) fn run(self, session: &mut Session<'_>) -> Result<ExitCode, Failure> {
-        let scene = scene::read(&self.scene, &session.context)?;
-        std::fs::create_dir_all(&self.output).map_err(|e| Failure::new(ExitCode::Failure, e))?;
+        let folder = OutputFolder::prepare(&self.output)?;
+        let loaded = scene::read_with_origin(&self.scene, &session.context)?;
+        let scene = &loaded.scene;
         let context = &session.context;
         let goal = context.common.goal(context.started);
-        Footprint::to_prepare(&scene).require(context, || None)?;
-        context.common.install(|| -> Result<(), Failure> {
-            let world = World::new(&scene);
+        Footprint::to_prepare(scene).require(context, || None)?;
+        let baked = context.common.install(|| {
+            let world = World::new(scene);
             scene::require_light(&world)?;
-            let t = std::time::Instant::now();
-            let config = UnwrapConfig {
-                density: Density::Page(self.size.unwrap_or(512) as usize),
-                padding: self.padding as usize,
-                block_align: false,
-                object_scale: vec![1.0; scene.objects.len()],
+            let Some(baked) = self.bake(&world, context)? else {
+                return Ok(None);
             };
-            let atlas = UvUnwrap.unwrap(&scene, &config, &|_, _| true)?;
-            eprintln!(
-                "unwrap {:?} {} charts, use {:.3}",
-                t.elapsed(),
-                atlas.charts.len(),
-                atlas.utilisation(&scene)
-            );
-            let t = std::time::Instant::now();
-            let luxels = Luxels::new(&world, &atlas, 0.5);
-            eprintln!(
-                "luxels {:?} {} buried {}",
-                t.elapsed(),
-                luxels.lit.luxels.len(),
-                luxels.lit.buried.len()
-            );
-            let t = std::time::Instant::now();
-            let bake_config = BakeConfig {
-                gather: AdaptiveConfig {
-                    error: first_error(Some(&goal)),
-                    components: Components::All,
-                    most_patches: usize::MAX,
-                    seed: context.common.seed,
-                },
-                backface_tolerance: 0.5,
+            let delivery = Delivery {
+                folder: &folder,
+                world: &world,
+                origin: loaded.origin.as_ref(),
+                baked: &baked,
+                target: self.target,
+                include: super::name(&self.include),
+                seed: context.common.seed,
             };
-            let mut steering = Steering::new(context, Some(&goal));
-            let Some(baked) = bake::bake(&world, &luxels, &bake_config, &mut steering)? else {
-                return Ok(());
-            };
-            eprintln!(
-                "bake {:?} parts {:?} budget {:?}",
-                t.elapsed(),
-                baked.adaptive.parts,
-                baked.adaptive.budget
-            );
-            let t = std::time::Instant::now();
-            let mut map = Lightmap::new(
-                &atlas,
-                &luxels.lit.luxels,
-                &luxels.lit.buried,
-                &baked.gathered,
-            );
-            eprintln!("error {}", bake::relative_error(&map));
-            bake::add_resolution(&mut map, &luxels.lit.luxels);
-            eprintln!("error {}", bake::relative_error(&map));
-            dilate(&atlas, &luxels.lit.luxels, &luxels.triangles, &mut map);
-            let edges = seams::matched(&atlas, &scene);
-            let before = seams::steps(&map, &edges);
-            crate::lightmap::fit::fit(
-                &atlas,
-                &mut map,
-                &luxels.lit.luxels,
-                &baked.gathered,
-                &edges,
-            );
-            eprintln!(
-                "seams {} {:?} {:?}",
-                edges.len(),
-                before,
-                seams::steps(&map, &edges)
-            );
-            eprintln!("finish {:?}", t.elapsed());
-            if let Ok(name) = std::env::var("LUXEL_REF") {
-                check(&world, &atlas, &map, &name);
-            }
-            for page in 0..map.pages {
-                let picture = Picture {
-                    image: map.page(page, &map.values),
-                    layers: vec![("error".into(), map.page(page, &map.errors))],
-                    origin: None,
-                };
-                Output::prepare(&self.output.join(format!("lightmap_{page:03}.exr")))?
-                    .write(&exr::encode(&picture)?)?;
-            }
-            if let Some(camera) = scene.cameras.first() {
-                let frame = crate::camera::CameraFrame::new(camera, [512, 512])?;
-                let view = LightmapView::new(&world, &atlas, &map);
-                let film = expose(&view, &frame, Samples::new(16, 0), &Silent);
-                let image = film.mean();
-                let tone = crate::tone_map::ToneMap::automatic(&image);
-                Output::prepare(&self.output.join("preview.png"))?
-                    .write(&crate::image::png::encode(&image, tone)?)?;
-                let page = map.page(0, &map.values);
-                let tone = crate::tone_map::ToneMap::automatic(&page);
-                Output::prepare(&self.output.join("page.png"))?
-                    .write(&crate::image::png::encode(&page, tone)?)?;
-            }
-            Ok(())
+            let manifest = delivery.write()?;
+            Ok::<_, Failure>(Some((manifest, stated(&baked))))
         })??;
-        Ok(ExitCode::Ok)
+        let Some((manifest, error)) = baked else {
+            return Ok(ExitCode::Interrupted);
+        };
+        let seconds = context.started.elapsed().as_secs_f64();
+        context.reporter.note(format_args!(
+            "{} luxels on {} page(s), {:.1} texels a metre, {seconds:.2} s{}; {}; between texels filtering leaves {:.2} %",
+            manifest.atlas.lit,
+            manifest.pages.len(),
+            manifest.atlas.texels_per_metre,
+            memory::peak_in_words(),
+            error.summary(Some(&goal)),
+            100.0 * manifest.error.filtering,
+        ));
+        let text = if context.common.json {
+            let mut json = serde_json::to_value(&manifest)?;
+            json["seconds"] = seconds.into();
+            json["target_error"] = error.to_json(Some(&goal));
+            memory::add_peak(&mut json);
+            serde_json::to_string_pretty(&json)?
+        } else {
+            self.output.join("manifest.json").display().to_string()
+        };
+        session.print(&text)?;
+        Ok(if session.context.interrupt.is_set() {
+            ExitCode::Interrupted
+        } else {
+            error.exit(Some(&goal))
+        })
+    }
+
+    /// Bakes a scene; `None` when it was stopped before there was any light.
+    fn bake(&self, world: &World<'_>, context: &Context<'_>) -> Result<Option<Baked>, Failure> {
+        let goal = context.common.goal(context.started);
+        let atlas = self.places(world, context)?;
+        let luxels = Luxels::new(world, &atlas, self.backface_tolerance);
+        let count = luxels.lit.luxels.len();
+        if count == 0 {
+            return Err(Failure::new(
+                ExitCode::NothingToDo,
+                format!(
+                    "{}: all luxels lie inside solids; check which way faces look (luxel check)",
+                    world.scene().name
+                ),
+            ));
+        }
+        let held = self.require_memory(world, &atlas, count, &goal, context)?;
+        let error = first_error(Some(&goal));
+        let first = self.first_patches(error);
+        let config = BakeConfig {
+            gather: AdaptiveConfig {
+                error,
+                components: self.include.into(),
+                most_patches: held.most_patches(world.scene(), first, context),
+                seed: context.common.seed,
+            },
+        };
+        let mut steering = Steering::new(context, Some(&goal));
+        let Some(found) = bake::bake(world, &luxels, &config, &mut steering)? else {
+            return Ok(None);
+        };
+        if found.adaptive.ending == Ending::TooManyPatches {
+            held_back(context);
+        }
+        let lit = &luxels.lit;
+        let raw = Lightmap::new(&atlas, &lit.luxels, &lit.buried, &found.gathered);
+        let mut map = raw.clone();
+        bake::add_resolution(&mut map, &lit.luxels);
+        let [of_luxels, total] = [&raw, &map].map(bake::relative_error);
+        dilate(&atlas, &lit.luxels, &luxels.triangles, &mut map);
+        let edges = seams::matched(&atlas, world.scene());
+        fit(&atlas, &mut map, &lit.luxels, &found.gathered, &edges);
+        Ok(Some(Baked {
+            error: manifest::Error {
+                luxels: of_luxels,
+                filtering: (total * total - of_luxels * of_luxels).max(0.0).sqrt(),
+                total,
+            },
+            atlas,
+            luxels,
+            raw,
+            map,
+            adaptive: found.adaptive,
+        }))
     }
 }
 
-fn check(
-    world: &World<'_>,
-    atlas: &crate::lightmap::atlas::Atlas,
-    map: &crate::lightmap::map::Lightmap,
-    file: &str,
-) {
-    use glam::DVec3;
-    use luxel_solver::bvh::{Hit, Ray};
-    let text = std::fs::read_to_string(file).unwrap();
-    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let get = |k: &str| -> Vec<[f64; 3]> { serde_json::from_value(json[k].clone()).unwrap() };
-    let (p, n, e) = (get("position"), get("normal"), get("E"));
-    let geometry = world.surfaces().geometry();
-    let (mut sq, mut sum, mut bias, mut rel, mut z, mut count, mut within) =
-        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, [0.0, 0.0]);
-    let mut worst = vec![];
-    let mean = e.iter().flatten().sum::<f64>() / (3.0 * e.len() as f64);
-    for i in 0..p.len() {
-        let n = DVec3::from(n[i]);
-        let q = geometry.frame().to_unit(DVec3::from(p[i]));
-        let ray = Ray {
-            origin: (q + n * 1e-5).as_vec3(),
-            tmin: 0.0,
-            direction: -n.as_vec3(),
-            tmax: 1e-4,
-        };
-        let mut hit = [Hit::MISS];
-        world.bvh().closest_hits(&[ray], &mut hit);
-        let Some(x) = world.interaction(&ray, &hit[0]) else {
-            eprintln!("miss {i}");
-            continue;
-        };
-        let Some((page, place)) =
-            crate::lightmap::lookup::place(atlas, world.scene(), geometry, x.point)
-        else {
-            eprintln!("nochart {i}");
-            continue;
-        };
-        let v = crate::lightmap::lookup::sample(map, &map.values, page, place);
-        let se = crate::lightmap::lookup::sample(map, &map.errors, page, place);
-        for c in 0..3 {
-            let d = v[c] - e[i][c];
-            sq += d * d;
-            sum += e[i][c];
-            bias += d;
-            count += 1.0;
-            rel += d * d / (e[i][c].powi(2) + (0.01 * mean).powi(2));
-            z += (d / se[c].max(1e-12)).powi(2);
-            if d.abs() <= 1.96 * se[c] {
-                within[0] += 1.0;
-            }
-        }
-        worst.push((
-            (v - DVec3::from(e[i])).length_squared(),
-            i,
-            v,
-            DVec3::from(e[i]),
-            place,
-            se,
-        ));
-    }
-    worst.sort_by(|a, b| b.0.total_cmp(&a.0));
-    eprintln!(
-        "nrmse {:.4} bias {:.5} rel {:.4} within {:.3} stated {:.4}",
-        (sq / count).sqrt() / (sum / count),
-        bias / sum,
-        (rel / count).sqrt(),
-        within[0] / count,
-        crate::lightmap::bake::relative_error(map)
-    );
-    let all: f64 = worst.iter().map(|w| w.0).sum();
-    let mut acc = 0.0;
-    for w in worst.iter().take(8) {
-        acc += w.0;
-        eprintln!(
-            "  {:.3} point {} map {:.4?} ref {:.4?} at {:.2?} se {:.4?}",
-            acc / all,
-            w.1,
-            w.2.to_array(),
-            w.3.to_array(),
-            w.4.to_array(),
-            w.5.to_array()
-        );
+/// The error of the light at luxels: what was asked for.
+fn stated(baked: &Baked) -> StatedError {
+    let lit = baked
+        .raw
+        .lit()
+        .map(|texel| baked.raw.values[texel].element_sum());
+    let level = lit.sum::<f64>() / (3.0 * baked.raw.lit().count() as f64);
+    let bound = baked.adaptive.solver_bound;
+    let solver = if level > 0.0 { bound / level } else { 0.0 };
+    StatedError::of_gather(&baked.adaptive.parts, solver)
+}
+
+/// Texels a metre, the root mean square over all surfaces that have texels.
+fn texels_per_metre(atlas: &Atlas, scene: &Scene) -> f64 {
+    let texels: f64 = atlas.object_texels(scene).iter().sum();
+    let charted = scene.face_ids().filter(|face| atlas.chart(*face).is_some());
+    let area: f64 = charted.map(|face| scene.area(face)).sum();
+    if area > 0.0 {
+        (texels / area).sqrt()
+    } else {
+        0.0
     }
 }

@@ -100,6 +100,8 @@ exits_with! {
     luxel_solver::pilot::PilotError => InvalidInput,
     luxel_solver::solvers::DirectError => Failure,
     luxel_solver::solvers::NotReciprocal => InvalidInput,
+    crate::lightmap::export::glb::GlbError => Failure,
+    crate::lightmap::given::GivenError => InvalidInput,
     crate::lightmap::unwrap::UnwrapError => InvalidInput,
     crate::ply::TooManyCorners => Failure,
     csv::Error => Failure,

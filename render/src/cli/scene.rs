@@ -2,17 +2,22 @@
 
 use super::Context;
 use super::exit::{ExitCode, Failure};
-use luxel_scenes::{Camera, Scene, UnitSystem, load};
+use luxel_scenes::{Camera, Loaded, Scene, UnitSystem, load};
 use luxel_solver::world::World;
 use std::path::Path;
 
 /// Reads a scene and passes its warnings on.
 pub(super) fn read(path: &Path, context: &Context<'_>) -> Result<Scene, Failure> {
+    Ok(read_with_origin(path, context)?.scene)
+}
+
+/// Reads a scene with what is known of its file, and passes its warnings on.
+pub(super) fn read_with_origin(path: &Path, context: &Context<'_>) -> Result<Loaded, Failure> {
     let loaded = load(path)?;
     for warning in &loaded.warnings {
         context.reporter.warning(warning);
     }
-    let scene = loaded.scene;
+    let scene = &loaded.scene;
     context.reporter.detail(format_args!(
         "{}: {} faces, {} objects, {} lights",
         scene.name,
@@ -26,7 +31,7 @@ pub(super) fn read(path: &Path, context: &Context<'_>) -> Result<Scene, Failure>
             format!("{}: the scene has no faces", path.display()),
         ));
     }
-    Ok(scene)
+    Ok(loaded)
 }
 
 /// Refuses a scene without any light.

@@ -1,16 +1,14 @@
 //! Bakes: light gathered at luxels, to a stated error.
 //!
 //! Luxels are receivers of the final gather like any others: direct light exact times sampled visibility, indirect light by rays into
-//! the radiosity solution, joined over luxels that share a plane ([`luxel_solver::adaptive`]). Where direct light changes
-//! within a texel ([`edges`](crate::lightmap::bake)) it is taken at further points of it and averaged, which keeps the outlines of
-//! shadows smooth.
+//! the radiosity solution, joined over luxels that share a plane ([`luxel_solver::adaptive`]).
 //!
 //! Valid for diffuse receivers. Biased as the gather is, by the finite size of patches and of the polynomials that join luxels;
 //! both are in the stated error.
 
 use super::atlas::Atlas;
 use super::luxels::{self, Luxel, Placed};
-use super::map::{Lightmap, Texel};
+use super::map::Lightmap;
 use super::receivers::{self, Lit};
 use luxel_scenes::Rgb;
 use luxel_solver::adaptive::{self, Adaptive, AdaptiveConfig, Control};
@@ -23,8 +21,6 @@ use luxel_solver::world::World;
 pub struct BakeConfig {
     /// What is gathered and how well.
     pub gather: AdaptiveConfig,
-    /// Share of a point's rays that may meet backs before it counts as buried, from 0 to 1.
-    pub backface_tolerance: f64,
 }
 
 /// Luxels of a scene, ready to be lit.
@@ -36,7 +32,7 @@ pub struct Luxels {
 }
 
 impl Luxels {
-    /// The luxels of an atlas.
+    /// The luxels of an atlas whose rays meet backs in no more than the share `backface_tolerance`.
     pub fn new(world: &World<'_>, atlas: &Atlas, backface_tolerance: f64) -> Self {
         let triangles = luxels::placed(atlas, world.scene(), world.surfaces().geometry());
         let all = luxels::luxels(atlas, &triangles);
@@ -121,15 +117,12 @@ pub fn add_resolution(map: &mut Lightmap, luxels: &[Luxel]) {
 
 /// Root of the mean square of the errors of lit luxels over the mean of their values, all channels together.
 pub fn relative_error(map: &Lightmap) -> f64 {
-    let lit = || {
-        let texels = map.texels.iter().enumerate();
-        texels
-            .filter(|(_, texel)| **texel == Texel::Lit)
-            .map(|(index, _)| index)
-    };
-    let count = 3.0 * lit().count().max(1) as f64;
-    let squares: f64 = lit().map(|index| map.errors[index].length_squared()).sum();
-    let sum: f64 = lit().map(|index| map.values[index].element_sum()).sum();
+    let count = 3.0 * map.lit().count().max(1) as f64;
+    let squares: f64 = map
+        .lit()
+        .map(|texel| map.errors[texel].length_squared())
+        .sum();
+    let sum: f64 = map.lit().map(|texel| map.values[texel].element_sum()).sum();
     if sum > 0.0 {
         (squares / count).sqrt() / (sum / count)
     } else {

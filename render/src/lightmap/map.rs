@@ -72,6 +72,14 @@ impl Lightmap {
         map
     }
 
+    /// Positions of the texels whose light was gathered.
+    pub fn lit(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        let texels = self.texels.iter().enumerate();
+        texels
+            .filter(|(_, texel)| **texel == Texel::Lit)
+            .map(|(position, _)| position)
+    }
+
     /// Texels of a page.
     pub fn page_texels(&self) -> usize {
         self.size[0] * self.size[1]

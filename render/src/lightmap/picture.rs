@@ -21,7 +21,8 @@ pub fn page(atlas: &Atlas, triangles: &[Placed], map: &Lightmap, page: usize) ->
                 if !triangle.overlaps(column, row) {
                     continue;
                 }
-                let is_buried = map.texels[atlas.texel(triangle.page, column, row)] == Texel::Buried;
+                let is_buried =
+                    map.texels[atlas.texel(triangle.page, column, row)] == Texel::Buried;
                 let is_hatched = is_buried && (column + row) % 4 < 2;
                 pixels[row * width + column] = if is_hatched { EMPTY } else { colour };
             }
@@ -33,7 +34,8 @@ pub fn page(atlas: &Atlas, triangles: &[Placed], map: &Lightmap, page: usize) ->
 /// Charts of one object have one hue and differ in lightness.
 fn colour(object: u64, chart: u64) -> [u8; 3] {
     let hue = (hash::mix64(object) >> 40) as f64 / f64::from(1_u32 << 24) * 6.0;
-    let light = 0.55 + 0.4 * (hash::mix64(chart ^ 0x5bd1_e995) >> 40) as f64 / f64::from(1_u32 << 24);
+    let light =
+        0.55 + 0.4 * (hash::mix64(chart ^ 0x5bd1_e995) >> 40) as f64 / f64::from(1_u32 << 24);
     // The channels of a pure hue: 1 within one sixth of their own, falling to 0 at two.
     [0.0, 2.0, 4.0].map(|own| {
         let away = (hue - own).abs().min(6.0 - (hue - own).abs());

@@ -8,7 +8,7 @@ use super::atlas::Atlas;
 use super::lookup;
 use super::map::Lightmap;
 use glam::{DVec2, DVec3};
-use luxel_scenes::{Rgb, Scene};
+use luxel_scenes::Scene;
 use std::collections::HashMap;
 
 /// Points of an edge to a texel of its length.

@@ -9,11 +9,13 @@ mod accessor;
 mod error;
 mod material;
 mod objects;
+mod origin;
 mod primitive;
 mod punctual;
 mod source;
 
 pub use error::GltfError;
+pub use origin::{GltfBytes, GltfOrigin, VertexOrigin};
 
 use crate::id::MaterialId;
 use crate::load::{FacePlace, LoadError, Part, Place, Warning, unique_name};
@@ -146,7 +148,7 @@ impl<'s> Reader<'s> {
         }
         if let Some(mesh) = node.mesh() {
             let name = self.name(node.name().or(mesh.name()), "object");
-            self.add_mesh(&mesh, name, transform)?;
+            self.add_mesh(node, &mesh, name, transform)?;
         }
         Ok(())
     }
@@ -160,6 +162,7 @@ impl<'s> Reader<'s> {
 
     fn add_mesh(
         &mut self,
+        node: &gltf::Node<'s>,
         mesh: &gltf::Mesh<'s>,
         name: String,
         transform: &DMat4,
@@ -170,6 +173,7 @@ impl<'s> Reader<'s> {
             self.primitives.push(Primitive {
                 object,
                 material,
+                node: node.index(),
                 mesh: mesh.clone(),
                 content: primitive,
                 transform: *transform,
@@ -203,6 +207,14 @@ impl<'s> Reader<'s> {
             let count = tally.lines_and_points;
             part.warnings.push(Warning::LinesAndPoints { count, place });
         }
+        part.origin = Some(GltfOrigin {
+            file: self.source.file.to_owned(),
+            runs: tally.origins,
+            scale: 1.0,
+            changed: Vec::new(),
+            lights: self.scene.lights.len(),
+            cameras: self.scene.cameras.len(),
+        });
         part.scene = self.scene;
         part.units = Some(UnitSystem::Photometric);
         part

@@ -2,6 +2,7 @@
 
 use super::error::GltfError;
 use super::material::UvMapping;
+use super::origin::VertexOrigin;
 use super::primitive::{self, Geometry};
 use super::source::Source;
 use crate::assemble::{self, Fragment};
@@ -15,13 +16,14 @@ use rayon::prelude::*;
 pub(super) struct Primitive<'s> {
     pub(super) object: ObjectId,
     pub(super) material: MaterialId,
+    pub(super) node: usize,
     pub(super) mesh: gltf::Mesh<'s>,
     pub(super) content: gltf::Primitive<'s>,
     /// To the world.
     pub(super) transform: DMat4,
 }
 
-/// What was left out, counted.
+/// What was left out, counted, and where the rest comes from.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     pub(super) dropped: usize,
@@ -29,6 +31,8 @@ pub(super) struct Tally {
     pub(super) first_dropped: Option<(String, usize)>,
     pub(super) lines_and_points: usize,
     pub(super) empty_objects: Vec<String>,
+    /// Where the vertices come from.
+    pub(super) origins: Vec<VertexOrigin>,
 }
 
 /// Triangles of a primitive that are put in at a time.
@@ -86,6 +90,12 @@ pub(super) fn add(
     for (primitive, geometry) in &geometries {
         let base = scene.vertices.len() as u32;
         scene.vertices.extend_from_slice(&geometry.positions);
+        tally.origins.push(VertexOrigin {
+            vertices: base..scene.vertices.len() as u32,
+            node: primitive.node as u32,
+            primitive: primitive.content.index() as u32,
+            is_mirrored: primitive::is_mirrored(&primitive.transform),
+        });
         let number = &mut numbers[primitive.object.index()];
         for triangles in geometry.triangles.chunks(assemble::FACES) {
             runs.push(Run {

@@ -105,7 +105,7 @@ pub(super) fn read(
         return Err(error("indices", format!("name vertex {index} of {count}")));
     }
     let mut triangles = triangles(mode, &indices);
-    if transform.determinant() < 0.0 {
+    if is_mirrored(transform) {
         // A mirror turns faces over; turning them back keeps what faced outwards outside.
         for triangle in &mut triangles {
             triangle.swap(1, 2);
@@ -140,6 +140,11 @@ fn check_attributes(
             .map_err(|e| ("indices", e))?;
     }
     Ok(())
+}
+
+/// Whether a transform turns faces over.
+pub(super) fn is_mirrored(transform: &DMat4) -> bool {
+    transform.determinant() < 0.0
 }
 
 /// Inverse transpose times a positive factor, which also exists where the inverse does not.

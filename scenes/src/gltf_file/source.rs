@@ -59,6 +59,11 @@ impl<'f> Source<'f> {
         })
     }
 
+    /// The bytes of all buffers.
+    pub(super) fn into_buffers(self) -> Vec<Vec<u8>> {
+        self.buffers
+    }
+
     /// The bytes of a buffer.
     pub(super) fn buffer(&self, index: usize) -> Option<&[u8]> {
         self.buffers.get(index).map(Vec::as_slice)

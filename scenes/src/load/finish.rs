@@ -42,6 +42,7 @@ pub(super) fn finish(
     let Merged {
         mut scene,
         mut warnings,
+        origin,
         ..
     } = merged;
     scene.name = name;
@@ -50,7 +51,11 @@ pub(super) fn finish(
         let place = Place::file(file);
         warnings.push(Warning::NoFaces { place });
     }
-    Ok(Loaded { scene, warnings })
+    Ok(Loaded {
+        scene,
+        warnings,
+        origin,
+    })
 }
 
 /// A factor of one on an image means "as the image says", and is lowered to [`WHITE`].

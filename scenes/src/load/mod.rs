@@ -17,6 +17,7 @@ pub(crate) use error::read_file;
 pub(crate) use finish::WHITE;
 pub(crate) use part::{MaterialSource, Merged, Part, unique_name};
 
+use crate::gltf_file::GltfOrigin;
 use crate::scene::Scene;
 use crate::{gltf_file, obj, scene_file};
 use std::ffi::OsStr;
@@ -29,6 +30,8 @@ pub struct Loaded {
     pub scene: Scene,
     /// Each names a file and what happened.
     pub warnings: Vec<Warning>,
+    /// Where the vertices come from, when all are from one glTF file; what writes the file again needs it.
+    pub origin: Option<GltfOrigin>,
 }
 
 /// Reads a scene file (`.toml`) or a geometry file (`.obj`, `.gltf`, `.glb`). With a geometry file,

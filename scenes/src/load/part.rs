@@ -2,6 +2,7 @@
 
 use super::place::Place;
 use super::warning::Warning;
+use crate::gltf_file::GltfOrigin;
 use crate::id::{MaterialId, ObjectId, TextureId};
 use crate::light::LightKind;
 use crate::scene::{Scene, UnitSystem};
@@ -28,6 +29,8 @@ pub(crate) struct Part {
     pub(crate) warnings: Vec<Warning>,
     /// What the lights are counted in, and what the format prescribes where nothing emits.
     pub(crate) units: Option<UnitSystem>,
+    /// Where the vertices come from, when the file is glTF.
+    pub(crate) origin: Option<GltfOrigin>,
 }
 
 /// All parts so far, as one.
@@ -40,6 +43,8 @@ pub(crate) struct Merged {
     pub(crate) warnings: Vec<Warning>,
     /// What a format prescribes where nothing emits.
     pub(crate) format_units: Option<UnitSystem>,
+    /// Where the vertices come from, as long as all are from one glTF file.
+    pub(crate) origin: Option<GltfOrigin>,
 }
 
 impl Merged {
@@ -50,6 +55,7 @@ impl Merged {
             materials,
             warnings,
             units,
+            origin,
         } = part;
         self.materials.extend(materials);
         self.warnings.extend(warnings);
@@ -60,8 +66,10 @@ impl Merged {
         ));
         if self.is_empty() {
             self.scene = part;
+            self.origin = origin;
             return;
         }
+        self.origin = None;
         let scene = &mut self.scene;
         make_unique(&scene.objects, &mut part.objects, |object| &mut object.name);
         make_unique(&scene.lights, &mut part.lights, |light| &mut light.name);

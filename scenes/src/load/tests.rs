@@ -21,6 +21,7 @@ fn the_example_scenes_load_without_warnings() {
         ("furnace", 192, 3, 24.0),
         ("corridor", 448, 5, 226.0),
         ("office", 29_712, 844, 291.289_668_869_398_27),
+        ("pavilion", 122, 8, 104.742_187_5),
     ] {
         let loaded = load(data(name, &format!("{name}.toml"))).expect(name);
         assert_eq!(loaded.warnings, [], "{name}");

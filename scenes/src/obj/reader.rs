@@ -261,6 +261,7 @@ impl<'t> Reader<'t> {
             materials: self.sources,
             warnings: self.warnings,
             units: None,
+            origin: None,
         }
     }
 

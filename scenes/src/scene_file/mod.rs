@@ -96,6 +96,9 @@ pub(crate) fn read(file: &Path, text: &str, opened: Option<&Path>) -> Result<Sce
     }
     let mut textures = TextureFiles::default();
     override_materials(&root, &settings, &mut merged, &mut textures)?;
+    if let Some(origin) = &mut merged.origin {
+        origin.changed.sort_unstable();
+    }
     add_polygons(&root, &settings, &mut merged)?;
     assign_objects(&root, &mut merged)?;
     for value in tables(&root, "light")? {
@@ -177,6 +180,9 @@ fn adapt(part: &mut Part, settings: &Settings) {
         }
     }
     let scale = settings.scale;
+    if let Some(origin) = &mut part.origin {
+        origin.scale = scale;
+    }
     let scene = &mut part.scene;
     scene
         .vertices
@@ -208,9 +214,13 @@ fn override_materials(
     for value in sections(root, "material")? {
         let change = Override::read(&value, settings, &mut merged.scene, textures)?;
         let mut is_known = false;
-        for (material, source) in merged.scene.materials.iter_mut().zip(&mut merged.materials) {
+        let materials = merged.scene.materials.iter_mut().enumerate();
+        for ((index, material), source) in materials.zip(&mut merged.materials) {
             if material.name == value.key() {
                 is_known = true;
+                if let Some(origin) = &mut merged.origin {
+                    origin.changed.push(MaterialId::new(index));
+                }
                 change.apply(material);
                 source.emission_units = change.emission_units().unwrap_or(source.emission_units);
             }
@@ -248,6 +258,7 @@ fn add_polygons(
     if polygons.is_empty() {
         return Ok(());
     }
+    merged.origin = None;
     let materials = materials_by_name(merged);
     let mut objects: HashMap<String, ObjectId> = merged
         .scene

@@ -1,0 +1,208 @@
+//! Writes the folder of a bake, each file whole or not at all and the manifest last: a folder with a manifest is complete.
+
+use super::{Baked, texels_per_metre};
+use crate::camera::CameraFrame;
+use crate::cli::exit::Failure;
+use crate::files::OutputFolder;
+use crate::image::exr::{self, Picture};
+use crate::image::{Image, png};
+use crate::integrators::{Samples, expose};
+use crate::lightmap::export::glb::glb;
+use crate::lightmap::export::obj::obj;
+use crate::lightmap::manifest::{self, Bevy, Files, Manifest, Page, Sampling, Units};
+use crate::lightmap::map::Texel;
+use crate::lightmap::picture;
+use crate::lightmap::target::Target;
+use crate::lightmap::view::LightmapView;
+use crate::progress::Silent;
+use crate::tone_map::ToneMap;
+use glam::DVec3;
+use luxel_scenes::{Camera, FieldOfView, GltfOrigin, Projection, Rgb, Scene, UnitSystem};
+use luxel_solver::world::World;
+
+/// Samples of a pixel of the preview, and its longer side where the scene has no camera that says.
+const PREVIEW_SAMPLES: u32 = 16;
+const PREVIEW_SIZE: [usize; 2] = [768, 576];
+
+/// What is delivered, to whom.
+pub(super) struct Delivery<'a> {
+    pub(super) folder: &'a OutputFolder,
+    pub(super) world: &'a World<'a>,
+    pub(super) origin: Option<&'a GltfOrigin>,
+    pub(super) baked: &'a Baked,
+    pub(super) target: Target,
+    pub(super) include: String,
+    pub(super) seed: u64,
+}
+
+impl Delivery<'_> {
+    /// Writes everything. Returns the manifest.
+    pub(super) fn write(&self) -> Result<Manifest, Failure> {
+        let Baked {
+            atlas,
+            map,
+            raw,
+            luxels,
+            ..
+        } = self.baked;
+        let scene = self.world.scene();
+        // An older manifest does not speak of what is written now.
+        self.folder.remove("manifest.json")?;
+        let pages: Vec<Page> = (0..atlas.pages).map(|page| self.page(page)).collect();
+        let factor = self.target.quantity().factor();
+        let scaled =
+            |values: &[Rgb]| -> Vec<Rgb> { values.iter().map(|value| *value * factor).collect() };
+        let (values, errors) = (scaled(&map.values), scaled(&map.errors));
+        for (index, page) in pages.iter().enumerate() {
+            self.picture(&page.file, map.page(index, &values), Vec::new())?;
+            self.picture(&page.error, map.page(index, &errors), Vec::new())?;
+            let error = ("error".to_owned(), raw.page(index, &raw.errors));
+            self.picture(&page.luxels, raw.page(index, &raw.values), vec![error])?;
+            let samples = picture::page(atlas, &luxels.triangles, map, index);
+            let name = if index == 0 {
+                "atlas.png".to_owned()
+            } else {
+                format!("atlas_{index:03}.png")
+            };
+            self.folder
+                .write(&name, &png::encode_rgb8(&samples, atlas.size)?)?;
+        }
+        let names: Vec<String> = pages.iter().map(|page| page.file.clone()).collect();
+        self.folder
+            .write("scene.glb", &glb(scene, self.origin, atlas, &names)?)?;
+        let (geometry, materials) = obj(scene, atlas, "scene.mtl");
+        self.folder.write("scene.mtl", &materials)?;
+        self.folder.write("scene.obj", &geometry)?;
+        let preview = self.preview()?;
+        let tone_map = ToneMap::automatic(&preview);
+        self.folder
+            .write("preview.png", &png::encode(&preview, tone_map)?)?;
+        let manifest = self.manifest(pages, f64::from(tone_map.exposure));
+        if let Some((name, text)) = self.target.snippet() {
+            let exposure = manifest.bevy.map_or(1.0, |bevy| bevy.lightmap_exposure);
+            let text = text.replace("{lightmap_exposure}", &format!("{exposure:?}"));
+            self.folder.write(name, text.as_bytes())?;
+        }
+        let mut text = serde_json::to_string_pretty(&manifest)?;
+        text.push('\n');
+        self.folder.write("manifest.json", text.as_bytes())?;
+        Ok(manifest)
+    }
+
+    fn page(&self, page: usize) -> Page {
+        Page {
+            file: format!("lightmap_{page:03}.exr"),
+            error: format!("lightmap_{page:03}_error.exr"),
+            luxels: format!("luxels_{page:03}.exr"),
+            width: self.baked.atlas.size[0],
+            height: self.baked.atlas.size[1],
+        }
+    }
+
+    fn picture(
+        &self,
+        name: &str,
+        image: Image,
+        layers: Vec<(String, Image)>,
+    ) -> Result<(), Failure> {
+        let picture = Picture {
+            image,
+            layers,
+            origin: None,
+        };
+        Ok(self.folder.write(name, &exr::encode(&picture)?)?)
+    }
+
+    /// The scene with its maps, from its first camera or one that sees most of it.
+    fn preview(&self) -> Result<Image, Failure> {
+        let scene = self.world.scene();
+        let camera = scene
+            .cameras
+            .first()
+            .cloned()
+            .unwrap_or_else(|| overview(scene));
+        let frame = CameraFrame::new(&camera, camera.size)?;
+        let view = LightmapView::new(self.world, &self.baked.atlas, &self.baked.map);
+        let samples = Samples::new(PREVIEW_SAMPLES, self.seed);
+        Ok(expose(&view, &frame, samples, &Silent).mean())
+    }
+
+    fn manifest(&self, pages: Vec<Page>, exposure: f64) -> Manifest {
+        let Baked {
+            atlas,
+            map,
+            error,
+            adaptive,
+            ..
+        } = self.baked;
+        let scene = self.world.scene();
+        let quantity = self.target.quantity();
+        Manifest {
+            schema: 1,
+            software: concat!("luxel ", env!("CARGO_PKG_VERSION")).into(),
+            scene: scene.name.clone(),
+            include: self.include.clone(),
+            units: Units {
+                quantity,
+                unit: match scene.units {
+                    UnitSystem::Radiometric => "W/m2",
+                    UnitSystem::Photometric => "lx",
+                },
+                factor: quantity.factor(),
+                colour_space: "linear Rec. 709",
+                target: self.target,
+            },
+            exposure,
+            pages,
+            atlas: Sampling {
+                texels_per_metre: texels_per_metre(atlas, scene),
+                utilisation: atlas.utilisation(scene),
+                charts: atlas.charts.len(),
+                padding: atlas.padding,
+                lit: map.lit().count(),
+                buried: map
+                    .texels
+                    .iter()
+                    .filter(|texel| **texel == Texel::Buried)
+                    .count(),
+            },
+            objects: manifest::objects(scene, atlas),
+            files: Files {
+                glb: "scene.glb".into(),
+                obj: "scene.obj".into(),
+                preview: "preview.png".into(),
+                atlas: "atlas.png".into(),
+            },
+            bevy: (self.target == Target::Bevy).then(|| Bevy::new(scene.units, exposure)),
+            error: *error,
+            energy: adaptive.ledger.map(Into::into),
+            patches: adaptive.patches,
+            seed: self.seed,
+        }
+    }
+}
+
+/// A wide view through a scene from near a corner of the box around it, a little above its middle.
+fn overview(scene: &Scene) -> Camera {
+    let (lower, upper) = scene.bounds().unwrap_or_default();
+    let (middle, size) = ((lower + upper) / 2.0, upper - lower);
+    // A flat scene is looked at from above it.
+    let height = size.y.max(0.5 * size.x.min(size.z));
+    let away = DVec3::new(0.42 * size.x, 0.15 * height, 0.42 * size.z);
+    let far = size.max_element()
+        * if size.y < 0.1 * size.x.max(size.z) {
+            1.0
+        } else {
+            0.0
+        };
+    Camera {
+        name: "overview".into(),
+        position: middle + away + DVec3::new(0.0, far, 0.0),
+        look_at: middle - DVec3::new(0.1 * size.x, 0.1 * size.y, 0.1 * size.z),
+        up: DVec3::Y,
+        projection: Projection::Perspective {
+            fov: FieldOfView::Horizontal(1.3),
+        },
+        size: PREVIEW_SIZE,
+    }
+}
