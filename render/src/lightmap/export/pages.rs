@@ -89,3 +89,55 @@ pub(super) fn rectangle(scene: &Scene, atlas: &Atlas, faces: &[FaceId]) -> [[f64
     }
     [lower, upper].map(|corner| [corner[0] / size[0], corner[1] / size[1]])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lightmap::export::testing;
+
+    #[test]
+    fn slivers_are_drawn_with_what_they_meet() {
+        let scene = testing::cornell();
+        let mut atlas = testing::atlas(&scene, 128);
+        // All faces of the first object but one lie on page 1, and the other has no texels.
+        let object = scene.faces[0].object;
+        let own: Vec<usize> = (0..scene.faces.len())
+            .filter(|&face| scene.faces[face].object == object)
+            .collect();
+        for &face in &own {
+            let chart = atlas.face_chart[face].expect("all faces have charts");
+            atlas.charts[chart.index()].page = 1;
+        }
+        atlas.face_chart[own[1]] = None;
+        let pages = Pages::new(&scene, &atlas);
+        assert_eq!(pages.of(FaceId::new(own[1])), Some(1));
+        for &face in &own {
+            atlas.face_chart[face] = None;
+        }
+        let pages = Pages::new(&scene, &atlas);
+        assert_eq!(
+            pages.of(FaceId::new(own[0])),
+            None,
+            "an object without charts"
+        );
+    }
+
+    #[test]
+    fn rectangles_hold_whole_texels() {
+        let scene = testing::cornell();
+        let atlas = testing::atlas(&scene, 128);
+        let faces: Vec<FaceId> = scene.face_ids().collect();
+        let all = atlas.rectangles(&scene);
+        for (number, rectangles) in all.iter().enumerate() {
+            let own = faces
+                .iter()
+                .copied()
+                .filter(|face| scene.faces[face.index()].object.index() == number);
+            let own: Vec<FaceId> = own.collect();
+            let [min, max] = rectangle(&scene, &atlas, &own);
+            let texels = |corner: [f64; 2]| corner.map(|x| (x * 128.0) as usize);
+            assert_eq!(texels(min), rectangles[0].min);
+            assert_eq!(texels(max), rectangles[0].max);
+        }
+    }
+}

@@ -86,3 +86,54 @@ fn visit(value: &mut Value, found: &mut dyn FnMut(&mut Value)) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn material() -> Value {
+        json!({
+            "normalTexture": {"index": 0, "texCoord": 1},
+            "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}},
+            "extensions": {"KHR_materials_clearcoat": {"clearcoatTexture": {"index": 0, "texCoord": 0,
+                "extensions": {"KHR_texture_transform": {"texCoord": 1}}}}},
+            "extras": {"someTexture": {"index": 0, "texCoord": 1}},
+        })
+    }
+
+    #[test]
+    fn a_material_is_copied_for_each_place_but_one() {
+        let document = |uses: &[Option<usize>]| {
+            let mut document = Document {
+                root: json!({"materials": [{}, material()]}),
+                binary: Vec::new(),
+            };
+            let uses = Uses::from([(1, uses.iter().copied().collect())]);
+            let moved = repoint(&mut document, &uses);
+            (document, moved)
+        };
+        let (alone, moved) = document(&[Some(2)]);
+        assert_eq!(moved, BTreeMap::from([((1, 2), 1)]));
+        let changed = &alone.items("materials")[1];
+        assert_eq!(changed["normalTexture"]["texCoord"], 2);
+        let clear = &changed["extensions"]["KHR_materials_clearcoat"]["clearcoatTexture"];
+        assert_eq!(clear["extensions"]["KHR_texture_transform"]["texCoord"], 2);
+        assert_eq!(clear["texCoord"], 0);
+        assert_eq!(changed["extras"], material()["extras"]);
+        assert!(!uses_second(changed) && uses_second(&material()));
+
+        let (several, moved) = document(&[None, Some(2), Some(3)]);
+        assert_eq!(moved, BTreeMap::from([((1, 2), 2), ((1, 3), 3)]));
+        let materials = several.items("materials");
+        assert_eq!(materials[1], material());
+        assert_eq!(materials[3]["normalTexture"]["texCoord"], 3);
+    }
+
+    #[test]
+    fn sets_are_counted_by_the_last() {
+        assert_eq!(count(&json!({"attributes": {"POSITION": 0}})), 0);
+        let two = json!({"attributes": {"TEXCOORD_1": 0, "TEXCOORD_0": 0, "TEXCOORD_x": 0}});
+        assert_eq!(count(&two), 2);
+    }
+}
