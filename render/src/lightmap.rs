@@ -8,6 +8,7 @@
 
 pub mod atlas;
 pub mod bake;
+pub mod denoise;
 pub mod dilation;
 pub mod export;
 pub mod fit;

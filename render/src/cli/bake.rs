@@ -14,17 +14,19 @@ use super::{Context, Session};
 use crate::files::OutputFolder;
 use crate::lightmap::atlas::Atlas;
 use crate::lightmap::bake::{self, BakeConfig, Luxels};
+use crate::lightmap::denoise::denoise;
 use crate::lightmap::dilation::dilate;
 use crate::lightmap::fit::fit;
+use crate::lightmap::luxels::Luxel;
 use crate::lightmap::manifest;
 use crate::lightmap::map::Lightmap;
 use crate::lightmap::seams;
 use crate::lightmap::target::Target;
 use clap::ValueEnum;
 use deliver::Delivery;
-use luxel_scenes::Scene;
+use luxel_scenes::{Rgb, Scene};
 use luxel_solver::adaptive::{Adaptive, AdaptiveConfig, Ending};
-use luxel_solver::gather::Components;
+use luxel_solver::gather::{Components, Gathered};
 use luxel_solver::world::World;
 use std::path::PathBuf;
 
@@ -72,6 +74,19 @@ pub(super) struct Bake {
     /// Share of a texel's rays that may meet backs of faces before it counts as lying inside a solid
     #[arg(long, value_name = "SHARE", default_value_t = 0.5, value_parser = places::parse_share)]
     backface_tolerance: f64,
+
+    /// What smooths the noise that is left; the maps of luxels stay as they were gathered
+    #[arg(long, value_enum, default_value = "builtin", value_name = "HOW")]
+    denoise: Denoise,
+}
+
+/// What smooths noise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Denoise {
+    /// Nothing
+    None,
+    /// Means of texels that noise alone tells apart, within charts
+    Builtin,
 }
 
 /// Which light is baked.
@@ -201,9 +216,18 @@ impl Bake {
         let mut map = raw.clone();
         bake::add_resolution(&mut map, &lit.luxels);
         let [of_luxels, total] = [&raw, &map].map(bake::relative_error);
+        if self.denoise == Denoise::Builtin {
+            denoise(&mut map, &lit.luxels, &found.gathered);
+        }
+        // What smoothing changed at a texel it changed at its luxels.
+        let value = |(luxel, gathered): (&Luxel, &Gathered)| {
+            let texel = luxel.texel as usize;
+            gathered.irradiance().0 + (map.values[texel] - raw.values[texel])
+        };
+        let values: Vec<Rgb> = lit.luxels.iter().zip(&found.gathered).map(value).collect();
         dilate(&atlas, &lit.luxels, &luxels.triangles, &mut map);
         let edges = seams::matched(&atlas, world.scene());
-        fit(&atlas, &mut map, &lit.luxels, &found.gathered, &edges);
+        fit(&atlas, &mut map, &lit.luxels, &values, &edges);
         Ok(Some(Baked {
             error: manifest::Error {
                 luxels: of_luxels,

@@ -19,7 +19,6 @@ use super::luxels::{Luxel, centre};
 use super::map::{Lightmap, Texel};
 use super::seams::Matched;
 use luxel_scenes::Rgb;
-use luxel_solver::gather::Gathered;
 
 /// Weight μ of a point of a seam against that of a lit luxel: a tuned value. Smaller, and steps stay; larger, and shadows that cross
 /// a seam are flattened along it.
@@ -42,35 +41,25 @@ struct Row {
     weight: f64,
 }
 
-/// Fits a map, whose empty texels are filled, to what was gathered at luxels and to seams.
+/// Fits a map, whose empty texels are filled, to the light at luxels and to seams.
 ///
 /// # Panics
-/// When there is not one of `gathered` for each luxel.
-pub fn fit(
-    atlas: &Atlas,
-    map: &mut Lightmap,
-    luxels: &[Luxel],
-    gathered: &[Gathered],
-    seams: &[Matched],
-) {
-    assert_eq!(
-        luxels.len(),
-        gathered.len(),
-        "something gathered at each luxel"
-    );
+/// When there is not one of `values` for each luxel.
+pub fn fit(atlas: &Atlas, map: &mut Lightmap, luxels: &[Luxel], values: &[Rgb], seams: &[Matched]) {
+    assert_eq!(luxels.len(), values.len(), "a value a luxel");
     let is_centred = centred(map, luxels);
     let mut unknowns = Unknowns {
         number: vec![NONE; map.texels.len()],
         texels: Vec::new(),
     };
     let mut rows = Vec::new();
-    for (luxel, gathered) in luxels.iter().zip(gathered) {
+    for (luxel, value) in luxels.iter().zip(values) {
         if luxel.is_centred() {
             continue;
         }
         let page = (luxel.texel as usize / map.page_texels()) as u32;
         let place = centre(atlas, luxel.texel as usize) + luxel.offset;
-        let mut row = Row::new(gathered.irradiance().0, 1.0);
+        let mut row = Row::new(*value, 1.0);
         for (entry, (texel, weight)) in lookup::taps(map.size, page, place).into_iter().enumerate()
         {
             if weight > 0.0 && is_centred[texel] {
