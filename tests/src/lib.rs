@@ -5,6 +5,7 @@
 //! say it briefly stands here.
 
 pub mod accuracy;
+pub mod baked;
 pub mod benchmarks;
 pub mod builder;
 pub mod cases;
@@ -16,6 +17,7 @@ pub mod golden;
 pub mod hypothesis;
 pub mod irradiance_fields;
 pub mod ledgers;
+pub mod lightmaps;
 pub mod metrics;
 pub mod occlusion;
 pub mod picture;

@@ -13,20 +13,15 @@ use super::steering::{Steering, first_error};
 use super::{Context, Session};
 use crate::files::OutputFolder;
 use crate::lightmap::atlas::Atlas;
-use crate::lightmap::bake::{self, BakeConfig, Luxels};
-use crate::lightmap::denoise::denoise;
-use crate::lightmap::dilation::dilate;
-use crate::lightmap::fit::fit;
-use crate::lightmap::luxels::Luxel;
+use crate::lightmap::bake::{self, Finished, Luxels, Smoothing};
 use crate::lightmap::manifest;
 use crate::lightmap::map::Lightmap;
-use crate::lightmap::seams;
 use crate::lightmap::target::Target;
 use clap::ValueEnum;
 use deliver::Delivery;
-use luxel_scenes::{Rgb, Scene};
+use luxel_scenes::Scene;
 use luxel_solver::adaptive::{Adaptive, AdaptiveConfig, Ending};
-use luxel_solver::gather::{Components, Gathered};
+use luxel_solver::gather::Components;
 use luxel_solver::world::World;
 use std::path::PathBuf;
 
@@ -196,13 +191,11 @@ impl Bake {
         let held = self.require_memory(world, &atlas, count, &goal, context)?;
         let error = first_error(Some(&goal));
         let first = self.first_patches(error);
-        let config = BakeConfig {
-            gather: AdaptiveConfig {
-                error,
-                components: self.include.into(),
-                most_patches: held.most_patches(world.scene(), first, context),
-                seed: context.common.seed,
-            },
+        let config = AdaptiveConfig {
+            error,
+            components: self.include.into(),
+            most_patches: held.most_patches(world.scene(), first, context),
+            seed: context.common.seed,
         };
         let mut steering = Steering::new(context, Some(&goal));
         let Some(found) = bake::bake(world, &luxels, &config, &mut steering)? else {
@@ -211,23 +204,13 @@ impl Bake {
         if found.adaptive.ending == Ending::TooManyPatches {
             held_back(context);
         }
-        let lit = &luxels.lit;
-        let raw = Lightmap::new(&atlas, &lit.luxels, &lit.buried, &found.gathered);
-        let mut map = raw.clone();
-        bake::add_resolution(&mut map, &lit.luxels);
-        let [of_luxels, total] = [&raw, &map].map(bake::relative_error);
-        if self.denoise == Denoise::Builtin {
-            denoise(&mut map, &lit.luxels, &found.gathered);
-        }
-        // What smoothing changed at a texel it changed at its luxels.
-        let value = |(luxel, gathered): (&Luxel, &Gathered)| {
-            let texel = luxel.texel as usize;
-            gathered.irradiance().0 + (map.values[texel] - raw.values[texel])
+        let smoothing = match self.denoise {
+            Denoise::None => Smoothing::None,
+            Denoise::Builtin => Smoothing::NonLocalMeans,
         };
-        let values: Vec<Rgb> = lit.luxels.iter().zip(&found.gathered).map(value).collect();
-        dilate(&atlas, &lit.luxels, &luxels.triangles, &mut map);
-        let edges = seams::matched(&atlas, world.scene());
-        fit(&atlas, &mut map, &lit.luxels, &values, &edges);
+        let Finished { raw, map } =
+            bake::finish(world.scene(), &atlas, &luxels, &found.gathered, smoothing);
+        let [of_luxels, total] = [&raw, &map].map(bake::relative_error);
         Ok(Some(Baked {
             error: manifest::Error {
                 luxels: of_luxels,

@@ -106,11 +106,12 @@ impl Atlas {
             };
             for corner in scene.faces[face.index()].corners() {
                 let place = self.corners[corner].to_array();
-                for axis in 0..2 {
-                    let low = place[axis].floor().max(0.0) as usize;
-                    let high = (place[axis].ceil().max(0.0) as usize).min(self.size[axis]);
-                    rectangle.min[axis] = rectangle.min[axis].min(low);
-                    rectangle.max[axis] = rectangle.max[axis].max(high);
+                let low = place.map(|x| x.floor().max(0.0) as usize);
+                let high = place.map(|x| x.ceil().max(0.0) as usize);
+                for axis in [0, 1] {
+                    rectangle.min[axis] = rectangle.min[axis].min(low[axis]);
+                    let most = high[axis].min(self.size[axis]);
+                    rectangle.max[axis] = rectangle.max[axis].max(most);
                 }
             }
         }

@@ -7,21 +7,18 @@
 //! both are in the stated error.
 
 use super::atlas::Atlas;
+use super::denoise::denoise;
+use super::dilation::dilate;
+use super::fit::fit;
 use super::luxels::{self, Luxel, Placed};
 use super::map::Lightmap;
 use super::receivers::{self, Lit};
-use luxel_scenes::Rgb;
+use super::seams::matched;
+use luxel_scenes::{Rgb, Scene};
 use luxel_solver::adaptive::{self, Adaptive, AdaptiveConfig, Control};
-use luxel_solver::gather::{Gathered, finish};
+use luxel_solver::gather::{self, Gathered};
 use luxel_solver::pilot::PilotError;
 use luxel_solver::world::World;
-
-/// What a bake is made with besides the scene and its atlas.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BakeConfig {
-    /// What is gathered and how well.
-    pub gather: AdaptiveConfig,
-}
 
 /// Luxels of a scene, ready to be lit.
 pub struct Luxels {
@@ -56,22 +53,69 @@ pub struct Baked {
 pub fn bake(
     world: &World<'_>,
     luxels: &Luxels,
-    config: &BakeConfig,
+    config: &AdaptiveConfig,
     control: &mut dyn Control,
 ) -> Result<Option<Baked>, PilotError> {
     let receivers = &luxels.lit.receivers;
-    let mut adaptive = adaptive::irradiance(world, receivers, &config.gather, control)?;
+    let mut adaptive = adaptive::irradiance(world, receivers, config, control)?;
     if adaptive.tallies.is_empty() {
         return Ok(None);
     }
-    let gathered = finish(&std::mem::take(&mut adaptive.tallies));
+    let gathered = gather::finish(&std::mem::take(&mut adaptive.tallies));
     Ok(Some(Baked { gathered, adaptive }))
+}
+
+/// What is done about the noise that is left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Smoothing {
+    /// Nothing.
+    None,
+    /// [`denoise`](crate::lightmap::denoise).
+    NonLocalMeans,
+}
+
+/// Maps that are ready to be delivered.
+pub struct Finished {
+    /// What was gathered, zero where nothing was.
+    pub raw: Lightmap,
+    /// What is looked up: smoothed, filled and fitted; its errors hold what filtering leaves.
+    pub map: Lightmap,
+}
+
+/// Makes maps of what was gathered at luxels.
+///
+/// # Panics
+/// When there is not one of `gathered` for each luxel.
+pub fn finish(
+    scene: &Scene,
+    atlas: &Atlas,
+    luxels: &Luxels,
+    gathered: &[Gathered],
+    smoothing: Smoothing,
+) -> Finished {
+    let lit = &luxels.lit;
+    let raw = Lightmap::new(atlas, &lit.luxels, &lit.buried, gathered);
+    let mut map = raw.clone();
+    add_resolution(&mut map, &lit.luxels);
+    if smoothing == Smoothing::NonLocalMeans {
+        denoise(&mut map, &lit.luxels, gathered);
+    }
+    // What smoothing changed at a texel it changed at its luxels.
+    let value = |(luxel, gathered): (&Luxel, &Gathered)| {
+        let texel = luxel.texel as usize;
+        gathered.irradiance().0 + (map.values[texel] - raw.values[texel])
+    };
+    let values: Vec<Rgb> = lit.luxels.iter().zip(gathered).map(value).collect();
+    dilate(atlas, &lit.luxels, &luxels.triangles, &mut map);
+    let seams = matched(atlas, scene);
+    fit(atlas, &mut map, &lit.luxels, &values, &seams);
+    Finished { raw, map }
 }
 
 /// Adds to the errors of lit luxels what bilinear filtering leaves between their centres: of a function of second derivatives f_xx and
 /// f_yy at most (|f_xx| + |f_yy|) / 8 in texels, judged by differences of neighbours in the same chart less the noise in
 /// them. Valid where light varies slowly against a texel; at the outlines of sharp shadows it is of the size of the step.
-pub fn add_resolution(map: &mut Lightmap, luxels: &[Luxel]) {
+fn add_resolution(map: &mut Lightmap, luxels: &[Luxel]) {
     const NONE: u32 = u32::MAX;
     let [width, height] = map.size;
     let mut charts = vec![NONE; map.texels.len()];

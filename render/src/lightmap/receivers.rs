@@ -3,6 +3,7 @@
 //! - A point under other geometry sees the backs of one-sided faces. Where more than a tolerated share of its rays does, other
 //!   points of the same texel are tried, the nearest to its centre first; where all are buried the luxel is *invalid*
 //!   and is filled from its neighbours later.
+//! - Of several points of a texel only those count that see the first: a wall may stand between them.
 //! - On smooth surfaces light is received along the shading normal, from a point on the curved surface that the facets stand for
 //!   (J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021): a facet's own horizon would show otherwise.
 //!
@@ -81,6 +82,7 @@ pub fn lit(
     lost.retain(|texel| !better.contains_key(texel));
     luxels.extend(better.into_values());
     luxels.sort_by_key(|luxel| luxel.texel);
+    let luxels = connected(world, luxels);
     let receivers = luxels
         .par_iter()
         .map(|luxel| receiver(world, luxel.point))
@@ -90,6 +92,41 @@ pub fn lit(
         receivers,
         buried: lost,
     }
+}
+
+/// Of each texel's luxels the first and those that it sees: a wall through a texel leaves those on one of its sides.
+fn connected(world: &World<'_>, luxels: Vec<Luxel>) -> Vec<Luxel> {
+    let mut first = luxels.first().copied();
+    let firsts: Vec<Option<Luxel>> = luxels
+        .iter()
+        .map(|luxel| {
+            let same = first.filter(|first| first.texel == luxel.texel);
+            if same.is_none() {
+                first = Some(*luxel);
+            }
+            same
+        })
+        .collect();
+    let segments: Vec<Ray> = luxels
+        .iter()
+        .zip(&firsts)
+        .filter_map(|(luxel, first)| {
+            let [one, other] = [first.as_ref()?, luxel].map(|l| on_face(world, l.point));
+            // Above the surface, which may be curved.
+            let height = 0.5 * one.position.distance(other.position);
+            let [from, to] = [one, other].map(|r| r.origin + (r.normal * height).as_vec3());
+            Some(Ray::segment(from, to))
+        })
+        .collect();
+    let mut blocked = vec![false; segments.len()];
+    world.bvh().occluded(&segments, &mut blocked);
+    let mut blocked = blocked.into_iter();
+    luxels
+        .into_iter()
+        .zip(firsts)
+        .filter(|(_, first)| first.is_none() || blocked.next() == Some(false))
+        .map(|(luxel, _)| luxel)
+        .collect()
 }
 
 /// The points of a regular grid in some texels, given in order, that lie on faces.

@@ -115,7 +115,7 @@ impl<'a> Gathering<'a> {
     /// What there is now.
     pub(super) fn state(&self, lookup: Option<&Lookup>) -> Adaptive {
         let tallies = if self.receivers.len() >= JOINED_FROM {
-            joined(self.receivers, &self.tallies)
+            joined(self.world, self.receivers, &self.tallies)
         } else {
             self.tallies.clone()
         };

@@ -11,6 +11,7 @@
 //! is left. The bias of the polynomials shows in their residuals, which exceed the noise by its square;
 //! [`Cells::widening`] is the factor by which it and the noise together exceed the noise.
 //!
+//! Receivers that a wall stands between are not joined, where it is asked for ([`regions`]).
 //! Receivers that share a plane with fewer than [`FEWEST`] others stay as they are. Valid for values that
 //! are independent between receivers. Cost: about 4 µs a receiver with a few dozen columns, and 8 bytes a
 //! coefficient and column.
@@ -18,6 +19,7 @@
 mod dyadic;
 mod planes;
 mod polynomial;
+mod regions;
 
 use crate::world::Receiver;
 use dyadic::{Excess, Leaf, Point, Tree};
@@ -25,6 +27,7 @@ use glam::DVec3;
 use planes::Planes;
 use polynomial::{Factor, Sums, TERMS};
 use rayon::prelude::*;
+pub(crate) use regions::regions;
 use std::ops::Range;
 
 /// Receivers in a plane from which they are joined.
@@ -63,13 +66,13 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// The best cells for values at receivers.
+    /// The best cells for values at receivers. With `regions`, one for each receiver, no cell holds receivers of two regions.
     ///
     /// # Panics
     /// When there is not one value for each receiver.
-    pub fn new(receivers: &[Receiver], values: &[Value]) -> Self {
+    pub fn new(receivers: &[Receiver], values: &[Value], regions: Option<&[u32]>) -> Self {
         assert_eq!(receivers.len(), values.len(), "a value a receiver");
-        let planes = Planes::new(receivers, FEWEST);
+        let planes = Planes::new(receivers, regions, FEWEST);
         let trees = planes
             .all()
             .par_iter()
@@ -157,7 +160,7 @@ impl Field {
     /// many receivers share one coefficient there (at least one); `None` (and nothing is added) where it is
     /// not known: between planes, far from all receivers, and where their values are exact.
     ///
-    /// `position` and `normal` (unit) are in the unit frame.
+    /// `position` and `normal` (unit) are in the unit frame. Planes that are divided into regions are not known by places.
     ///
     /// # Panics
     /// When the columns do not exist, or `sums` has not one entry for each.
@@ -168,8 +171,33 @@ impl Field {
         columns: Range<usize>,
         sums: &mut [f64],
     ) -> Option<f64> {
-        assert!(columns.end <= self.columns && columns.len() == sums.len());
         let plane = self.cells.planes.find(position, normal)?;
+        self.add_in(plane, position, columns, sums)
+    }
+
+    /// The same for a receiver that the field was made of, by its number and position, in its own region.
+    ///
+    /// # Panics
+    /// As [`Self::add_at`], and when there is no such receiver.
+    pub fn add_of(
+        &self,
+        receiver: usize,
+        position: DVec3,
+        columns: Range<usize>,
+        sums: &mut [f64],
+    ) -> Option<f64> {
+        let plane = self.cells.planes.of(receiver)?;
+        self.add_in(plane, position, columns, sums)
+    }
+
+    fn add_in(
+        &self,
+        plane: usize,
+        position: DVec3,
+        columns: Range<usize>,
+        sums: &mut [f64],
+    ) -> Option<f64> {
+        assert!(columns.end <= self.columns && columns.len() == sums.len());
         let trees = &self.cells.trees[plane];
         let x = self.cells.planes.all()[plane]
             .coordinates(position)

@@ -1,7 +1,8 @@
 //! Receivers by the plane that they lie in.
 //!
 //! Receivers belong together when their normals and their heights along them agree within rounding. Where
-//! in the plane they lie does not matter: two table tops of one height are one plane. Cost: O(n log n).
+//! in the plane they lie does not matter: two table tops of one height are one plane, unless the plane is divided into
+//! [regions](super::regions). Cost: O(n log n).
 
 use crate::world::Receiver;
 use glam::{DVec2, DVec3};
@@ -37,14 +38,17 @@ impl Plane {
 
 /// All planes that hold enough receivers.
 pub(super) struct Planes {
-    /// Height and position of each plane of a normal, by height.
+    /// Height and position of each undivided plane of a normal, by height.
     by_normal: BTreeMap<Key, Vec<(f64, usize)>>,
+    /// The plane of each receiver.
+    of_receiver: Vec<Option<u32>>,
     planes: Vec<Plane>,
 }
 
 impl Planes {
-    /// The planes with at least `fewest` receivers.
-    pub(super) fn new(receivers: &[Receiver], fewest: usize) -> Self {
+    /// The planes with at least `fewest` receivers. With `regions`, the number of one for each receiver, those of a plane that
+    /// are of different regions count as lying in different planes.
+    pub(super) fn new(receivers: &[Receiver], regions: Option<&[u32]>, fewest: usize) -> Self {
         let mut keyed: Vec<(Key, f64, u32)> = receivers
             .iter()
             .zip(0..)
@@ -59,6 +63,7 @@ impl Planes {
         });
         let mut found = Self {
             by_normal: BTreeMap::new(),
+            of_receiver: vec![None; receivers.len()],
             planes: Vec::new(),
         };
         for run in keyed.chunk_by(|a, b| a.0 == b.0 && b.1 - a.1 <= HEIGHT) {
@@ -67,24 +72,45 @@ impl Planes {
             }
             let first = &receivers[run[0].2 as usize];
             let (tangent, bitangent) = first.normal.any_orthonormal_pair();
+            let axes = [tangent, bitangent];
             let mut members: Vec<u32> = run.iter().map(|entry| entry.2).collect();
             members.sort_unstable();
-            let middle = 0.5 * (run[0].1 + run[run.len() - 1].1);
-            let of_normal = found.by_normal.entry(run[0].0).or_default();
-            of_normal.push((middle, found.planes.len()));
-            found.planes.push(Plane {
-                axes: [tangent, bitangent],
-                members,
-            });
+            let Some(regions) = regions else {
+                let middle = 0.5 * (run[0].1 + run[run.len() - 1].1);
+                let of_normal = found.by_normal.entry(run[0].0).or_default();
+                of_normal.push((middle, found.planes.len()));
+                found.push(Plane { axes, members });
+                continue;
+            };
+            members.sort_by_key(|&member| regions[member as usize]);
+            for members in members.chunk_by(|&a, &b| regions[a as usize] == regions[b as usize]) {
+                if members.len() >= fewest {
+                    let members = members.to_vec();
+                    found.push(Plane { axes, members });
+                }
+            }
         }
         found
+    }
+
+    fn push(&mut self, plane: Plane) {
+        for &member in &plane.members {
+            self.of_receiver[member as usize] = Some(self.planes.len() as u32);
+        }
+        self.planes.push(plane);
+    }
+
+    /// The plane of a receiver, by its position among all.
+    #[inline]
+    pub(super) fn of(&self, receiver: usize) -> Option<usize> {
+        self.of_receiver[receiver].map(|plane| plane as usize)
     }
 
     pub(super) fn all(&self) -> &[Plane] {
         &self.planes
     }
 
-    /// The plane of a receiver, by its position among all.
+    /// The undivided plane that a place lies in, by its position among all.
     #[inline]
     pub(super) fn find(&self, position: DVec3, normal: DVec3) -> Option<usize> {
         let of_normal = self.by_normal.get(&key(normal))?;
@@ -121,7 +147,7 @@ mod tests {
             receivers.push(receiver([x, 0.1, 0.3], DVec3::Z));
         }
         receivers.push(receiver([0.0, 0.0, 0.4], DVec3::Z));
-        let planes = Planes::new(&receivers, 2);
+        let planes = Planes::new(&receivers, None, 2);
         let sizes: Vec<usize> = planes
             .all()
             .iter()

@@ -66,7 +66,7 @@ fn join(receivers: &[Receiver], seed: u64, truth: impl Fn(DVec3) -> f64, sigma: 
             variance: scatter(x),
         })
         .collect();
-    let cells = Cells::new(receivers, &values);
+    let cells = Cells::new(receivers, &values, None);
     let widening = cells.widening(REPLICATES as u32 - 1);
     let field = cells.join(REPLICATES, |i, row| row.copy_from_slice(&noisy[i]));
     let mut errors = Errors {
@@ -157,7 +157,7 @@ fn nothing_is_joined_that_is_exact() {
             variance: if receiver.position.z < 0.2 { 0.0 } else { 0.01 },
         })
         .collect();
-    let field = Cells::new(&receivers, &values).join(1, |_, row| row[0] = 1.0);
+    let field = Cells::new(&receivers, &values, None).join(1, |_, row| row[0] = 1.0);
     for receiver in &receivers {
         let at = field.add_at(receiver.position, receiver.normal, 0..1, &mut [0.0]);
         assert_eq!(at.is_some(), receiver.position.z > 0.2);
@@ -174,7 +174,7 @@ fn places_apart_from_all_receivers_are_unknown() {
         };
         receivers.len()
     ];
-    let field = Cells::new(&receivers, &values).join(1, |_, row| row[0] = 1.0);
+    let field = Cells::new(&receivers, &values, None).join(1, |_, row| row[0] = 1.0);
     let at = |x: f64, y: f64, z: f64, normal| {
         let mut sum = [0.0];
         let shared = field.add_at(DVec3::new(x, y, z), normal, 0..1, &mut sum);
@@ -214,7 +214,7 @@ fn degenerate_receivers_have_a_field_too() {
         };
         few.len()
     ];
-    let field = Cells::new(&few, &values).join(1, |_, row| row[0] = 1.0);
+    let field = Cells::new(&few, &values, None).join(1, |_, row| row[0] = 1.0);
     let known = field.add_at(few[3].position, DVec3::Z, 0..1, &mut [0.0]);
     assert_eq!(known, None);
 }

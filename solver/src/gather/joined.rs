@@ -7,8 +7,8 @@
 
 use super::lookup::MAX_REPLICATES;
 use super::tally::Tally;
-use crate::field::{Cells, Field, Value};
-use crate::world::Receiver;
+use crate::field::{Cells, Field, Value, regions};
+use crate::world::{Receiver, World};
 use glam::DVec3;
 use luxel_scenes::{Irradiance, Rgb};
 use rayon::prelude::*;
@@ -35,6 +35,7 @@ fn by_gather(tally: &Tally) -> [Rgb; MAX_REPLICATES] {
 fn cells_of(
     receivers: &[Receiver],
     tallies: &[Tally],
+    regions: Option<&[u32]>,
     light: impl Fn(&Tally) -> [Rgb; MAX_REPLICATES] + Sync,
 ) -> (Cells, f64) {
     let values: Vec<Value> = tallies
@@ -42,7 +43,7 @@ fn cells_of(
         .map(|tally| value(&light(tally), tally.gathers))
         .collect();
     let gathers = tallies.first().map_or(0, |tally| tally.gathers);
-    let cells = Cells::new(receivers, &values);
+    let cells = Cells::new(receivers, &values, regions);
     let widening = cells.widening(u32::from(gathers.max(2)) - 1);
     (cells, widening)
 }
@@ -106,19 +107,20 @@ impl Tally {
     }
 }
 
-/// The tallies of receivers after their light was joined with that of their neighbours. All are of as many
+/// The tallies of receivers after their light was joined with that of neighbours which no wall stands before. All are of as many
 /// rays, gathers and solutions.
 ///
 /// # Panics
 /// When there is not one tally for each receiver.
-pub fn joined(receivers: &[Receiver], tallies: &[Tally]) -> Vec<Tally> {
+pub fn joined(world: &World, receivers: &[Receiver], tallies: &[Tally]) -> Vec<Tally> {
     let mut joined = tallies.to_vec();
-    let (cells, widening) = cells_of(receivers, tallies, by_gather);
+    let regions = regions(receivers, world.bvh());
+    let (cells, widening) = cells_of(receivers, tallies, Some(&regions), by_gather);
     let field = cells.join(COLUMNS, |index, row| write(&tallies[index], widening, row));
-    let places = receivers.par_iter().zip(&mut joined);
-    places.for_each(|(receiver, tally)| {
+    let places = receivers.par_iter().zip(&mut joined).enumerate();
+    places.for_each(|(index, (receiver, tally))| {
         let mut row = [0.0; COLUMNS];
-        let shared = field.add_at(receiver.position, receiver.normal, 0..COLUMNS, &mut row);
+        let shared = field.add_of(index, receiver.position, 0..COLUMNS, &mut row);
         if let Some(receivers) = shared {
             read(&row, tally);
             tally.share(receivers);
@@ -151,7 +153,7 @@ impl IndirectField {
             let replicates = [tally.gathers, tally.solutions].map(usize::from);
             assert_eq!(replicates, [MAX_REPLICATES; 2], "all replicates");
         }
-        let (cells, widening) = cells_of(receivers, tallies, by_gather);
+        let (cells, widening) = cells_of(receivers, tallies, None, by_gather);
         let columns = OF_REPLICATE * MAX_REPLICATES;
         Self(cells.join(columns, |index, row| {
             let tally = &tallies[index];
