@@ -39,10 +39,12 @@ impl Face {
 }
 
 /// A named group of faces.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Object {
     /// Its name, unique in the scene.
     pub name: String,
+    /// Factor on the texels a metre that it gets in lightmaps; zero where it gets none.
+    pub lightmap_scale: f64,
 }
 
 /// What each corner of each face carries. Arrays of features that no face has are empty.
@@ -218,7 +220,10 @@ impl Scene {
 
     /// Adds an object and returns its id.
     pub fn push_object(&mut self, name: impl Into<String>) -> ObjectId {
-        self.objects.push(Object { name: name.into() });
+        self.objects.push(Object {
+            name: name.into(),
+            lightmap_scale: 1.0,
+        });
         ObjectId::new(self.objects.len() - 1)
     }
 

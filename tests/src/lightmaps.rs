@@ -49,7 +49,6 @@ pub fn baked(scene: &Scene, side: usize, error: f64) -> Baked<'_> {
         density: Density::Page(side),
         padding: 1,
         block_align: false,
-        object_scale: vec![1.0; scene.objects.len()],
     };
     let atlas = UvUnwrap
         .unwrap(scene, &config, &|_, _| true)

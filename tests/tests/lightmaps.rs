@@ -42,7 +42,7 @@ fn against_reference(scene: &str, options: &[&str]) -> (Errors, f64) {
         let difference = (*value - expected[index]).abs();
         let error = (stated[index].powf(2.0) + uncertain[index].powf(2.0)).map(f64::sqrt);
         let inside = difference.cmple(1.96 * error);
-        within += inside.bitmask().count_ones() as f64;
+        within += f64::from(inside.bitmask().count_ones());
     }
     let errors = Errors::new(&values, &expected, &uncertain);
     (errors, within / (3.0 * values.len() as f64))

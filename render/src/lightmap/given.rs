@@ -65,17 +65,15 @@ pub enum GivenError {
     },
 }
 
-/// The atlas of one page that a scene's own second coordinates make. Objects whose scale is zero are left out.
+/// The atlas of one page that a scene's own second coordinates make. Objects whose `lightmap_scale` is zero are left out.
 ///
 /// # Errors
 /// When coordinates are missing, reach beyond the page, or overlap.
-pub fn given(
-    scene: &Scene,
-    geometry: &Geometry,
-    side: usize,
-    object_scale: &[f64],
-) -> Result<Atlas, GivenError> {
-    let is_used = |face: FaceId| object_scale[scene.faces[face.index()].object.index()] > 0.0;
+pub fn given(scene: &Scene, geometry: &Geometry, side: usize) -> Result<Atlas, GivenError> {
+    let is_used = |face: FaceId| {
+        let object = scene.faces[face.index()].object;
+        scene.objects[object.index()].lightmap_scale > 0.0
+    };
     let corners = &scene.corners.uv1;
     let place = |uv: Vec2| DVec2::new(f64::from(uv.x), 1.0 - f64::from(uv.y)) * side as f64;
     let places: Vec<DVec2> = corners.iter().map(|&uv| place(uv)).collect();

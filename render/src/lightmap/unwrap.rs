@@ -34,15 +34,15 @@ pub struct UnwrapConfig {
     pub padding: usize,
     /// Whether each chart has blocks of 4 × 4 texels of its own, for block compression.
     pub block_align: bool,
-    /// Factor on the density of each object; zero leaves an object out.
-    pub object_scale: Vec<f64>,
 }
 
 /// Why a scene cannot be unwrapped.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum UnwrapError {
     /// Nothing to unwrap.
-    #[error("no object is to get a lightmap; give one a lightmap_scale above 0")]
+    #[error(
+        "no object is to get a lightmap; give one a lightmap_scale above 0 ([object.\"NAME\"] in the scene file)"
+    )]
     Nothing,
     /// A chart is larger than a page.
     #[error(
@@ -68,7 +68,7 @@ pub enum UnwrapError {
     Refused(String),
 }
 
-/// Gives faces places in pages. The same scene and configuration give the same atlas on every machine.
+/// Gives the faces of all objects whose `lightmap_scale` is not zero places in pages. The same scene and configuration give the same atlas on every machine.
 pub trait Unwrapper {
     /// Unwraps a scene. `progress` hears of done and all pieces of a stage and stops the work by false.
     ///
@@ -111,7 +111,7 @@ impl Unwrapper for UvUnwrap {
         let meshes = meshes(scene);
         let used: Vec<usize> = (0..meshes.len())
             .filter(|&object| {
-                config.object_scale[object] > 0.0 && !meshes[object].indices.is_empty()
+                scene.objects[object].lightmap_scale > 0.0 && !meshes[object].indices.is_empty()
             })
             .collect();
         if used.is_empty() {
@@ -121,7 +121,7 @@ impl Unwrapper for UvUnwrap {
             .iter()
             .map(|&object| uvunwrap::MeshInput {
                 polygons: Some(&meshes[object].polygons),
-                scale: config.object_scale[object] as f32,
+                scale: scene.objects[object].lightmap_scale as f32,
                 ..uvunwrap::MeshInput::new(&meshes[object].positions, &meshes[object].indices)
             })
             .collect();

@@ -27,6 +27,7 @@
 //!
 //! [object."lamp*"]                   # all objects whose name matches
 //! material = "glow"
+//! lightmap_scale = 2                 # factor on its texels a metre; 0: it gets no lightmap
 //!
 //! [[polygon]]
 //! object   = "floor"
@@ -70,7 +71,7 @@ use value::Value;
 const KEYS: &[&str] = &[
     "geometry", "scene", "camera", "light", "material", "object", "polygon",
 ];
-const OBJECT_KEYS: &[&str] = &["material"];
+const OBJECT_KEYS: &[&str] = &["material", "lightmap_scale"];
 
 /// What a scene file gives: everything, not checked yet.
 #[derive(Debug)]
@@ -304,6 +305,14 @@ fn assign_objects(root: &Table, merged: &mut Merged) -> Result<(), SceneFileErro
             for face in &mut scene.faces {
                 if matches[face.object.index()] {
                     face.material = material;
+                }
+            }
+        }
+        if let Some(scale) = table.get("lightmap_scale") {
+            let scale = scale.number_in("from 0 to 64", |scale| (0.0..=64.0).contains(&scale))?;
+            for (object, matches) in scene.objects.iter_mut().zip(&matches) {
+                if *matches {
+                    object.lightmap_scale = scale;
                 }
             }
         }

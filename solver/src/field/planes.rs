@@ -42,7 +42,7 @@ pub(super) struct Planes {
     by_normal: BTreeMap<Key, Vec<(f64, usize)>>,
     /// The plane of each receiver.
     of_receiver: Vec<Option<u32>>,
-    planes: Vec<Plane>,
+    all: Vec<Plane>,
 }
 
 impl Planes {
@@ -64,7 +64,7 @@ impl Planes {
         let mut found = Self {
             by_normal: BTreeMap::new(),
             of_receiver: vec![None; receivers.len()],
-            planes: Vec::new(),
+            all: Vec::new(),
         };
         for run in keyed.chunk_by(|a, b| a.0 == b.0 && b.1 - a.1 <= HEIGHT) {
             if run.len() < fewest {
@@ -78,7 +78,7 @@ impl Planes {
             let Some(regions) = regions else {
                 let middle = 0.5 * (run[0].1 + run[run.len() - 1].1);
                 let of_normal = found.by_normal.entry(run[0].0).or_default();
-                of_normal.push((middle, found.planes.len()));
+                of_normal.push((middle, found.all.len()));
                 found.push(Plane { axes, members });
                 continue;
             };
@@ -95,9 +95,9 @@ impl Planes {
 
     fn push(&mut self, plane: Plane) {
         for &member in &plane.members {
-            self.of_receiver[member as usize] = Some(self.planes.len() as u32);
+            self.of_receiver[member as usize] = Some(self.all.len() as u32);
         }
-        self.planes.push(plane);
+        self.all.push(plane);
     }
 
     /// The plane of a receiver, by its position among all.
@@ -107,7 +107,7 @@ impl Planes {
     }
 
     pub(super) fn all(&self) -> &[Plane] {
-        &self.planes
+        &self.all
     }
 
     /// The undivided plane that a place lies in, by its position among all.

@@ -52,12 +52,11 @@ impl Bake {
             },
             padding: usize::from(self.padding),
             block_align: self.block_align,
-            object_scale: vec![1.0; scene.objects.len()],
         };
         let has_given = !scene.corners.uv1.is_empty();
         if self.uv == Whence::Keep || self.uv == Whence::Auto && has_given {
             let geometry = world.surfaces().geometry();
-            match given(scene, geometry, side, &config.object_scale) {
+            match given(scene, geometry, side) {
                 Ok(atlas) => return Ok(atlas),
                 Err(error) if self.uv == Whence::Keep => return Err(error.into()),
                 Err(error) => context

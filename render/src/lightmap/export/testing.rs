@@ -39,7 +39,6 @@ fn unwrapped(scene: &Scene, density: Density) -> Atlas {
         density,
         padding: 1,
         block_align: false,
-        object_scale: vec![1.0; scene.objects.len()],
     };
     let atlas = UvUnwrap.unwrap(scene, &config, &|_, _| true);
     atlas.expect("the scene can be unwrapped")
