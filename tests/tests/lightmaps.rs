@@ -81,7 +81,7 @@ fn the_furnace_is_even() {
         "-q",
     ])
     .assert_success();
-    let luxels = exr::read(&folder.path().join("luxels_000.exr")).expect("luxels");
+    let luxels = exr::read(&folder.path().join("lightmap_000_luxels.exr")).expect("luxels");
     let map = exr::read(&folder.path().join("lightmap_000.exr")).expect("a map");
     let lit = luxels.image.pixels.iter().filter(|pixel| pixel[0] > 0.0);
     assert!(
@@ -242,7 +242,7 @@ fn delivered_coordinates_are_kept() {
     bake(&file, first.path(), "unwrap").assert_success();
     bake(&first.path().join("scene.glb"), second.path(), "keep").assert_success();
     let [one, two] = [&first, &second].map(|folder| {
-        let map = exr::read(&folder.path().join("luxels_000.exr")).expect("luxels");
+        let map = exr::read(&folder.path().join("lightmap_000_luxels.exr")).expect("luxels");
         map.image.pixels
     });
     let is_lit = |pixel: &[f32; 3]| pixel[0] > 0.0;

@@ -2,25 +2,26 @@
 
 mod deliver;
 mod footprint;
+mod gathered;
 mod places;
 
 use super::exit::{ExitCode, Failure};
-use super::footprint::{Footprint, held_back};
+use super::footprint::Footprint;
+use super::goal::Goal;
 use super::memory;
 use super::scene;
 use super::stated::StatedError;
-use super::steering::{Steering, first_error};
 use super::{Context, Session};
 use crate::files::OutputFolder;
+use crate::integrators::ao::Falloff;
 use crate::lightmap::atlas::Atlas;
 use crate::lightmap::bake::{self, Finished, Luxels, Smoothing};
-use crate::lightmap::manifest;
-use crate::lightmap::map::Lightmap;
+use crate::lightmap::manifest::{self, Manifest};
 use crate::lightmap::target::Target;
 use clap::ValueEnum;
 use deliver::Delivery;
+use gathered::AtLuxels;
 use luxel_scenes::Scene;
-use luxel_solver::adaptive::{Adaptive, AdaptiveConfig, Ending};
 use luxel_solver::gather::Components;
 use luxel_solver::world::World;
 use std::path::PathBuf;
@@ -42,9 +43,28 @@ pub(super) struct Bake {
     #[arg(long = "for", value_enum, default_value = "raw", value_name = "WHOM")]
     target: Target,
 
-    /// Which light the maps hold
-    #[arg(long, value_enum, default_value = "all", value_name = "WHICH")]
-    include: Include,
+    /// What the maps hold; for several, separated by commas, there is a set of maps each, the first called lightmap
+    #[arg(
+        long,
+        value_enum,
+        default_value = "all",
+        value_name = "WHAT",
+        value_delimiter = ','
+    )]
+    include: Vec<Include>,
+
+    /// Of ambient occlusion: metres beyond which nothing occludes
+    #[arg(long, value_name = "D", value_parser = super::parse_length)]
+    max_distance: Option<f64>,
+
+    /// With --max-distance: how nearer blockers count
+    #[arg(
+        long,
+        value_name = "HOW",
+        requires = "max_distance",
+        default_value = "sharp"
+    )]
+    falloff: Falloff,
 
     /// Where texture coordinates come from
     #[arg(long, value_enum, default_value = "auto", value_name = "WHENCE")]
@@ -84,23 +104,27 @@ enum Denoise {
     Builtin,
 }
 
-/// Which light is baked.
+/// What is baked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Include {
-    /// All
+    /// All light
     All,
-    /// Straight from a source
+    /// Light straight from a source
     Direct,
-    /// After at least one reflection
+    /// Light after at least one reflection
     Indirect,
+    /// Ambient occlusion, 1 = open
+    Ao,
 }
 
-impl From<Include> for Components {
-    fn from(include: Include) -> Self {
-        match include {
-            Include::All => Self::All,
-            Include::Direct => Self::Direct,
-            Include::Indirect => Self::Indirect,
+impl Include {
+    /// Which light; `None` for occlusion.
+    fn components(self) -> Option<Components> {
+        match self {
+            Self::All => Some(Components::All),
+            Self::Direct => Some(Components::Direct),
+            Self::Indirect => Some(Components::Indirect),
+            Self::Ao => None,
         }
     }
 }
@@ -109,26 +133,36 @@ impl From<Include> for Components {
 struct Baked {
     atlas: Atlas,
     luxels: Luxels,
-    /// What was gathered, with nothing filled in.
-    raw: Lightmap,
-    /// What is delivered.
-    map: Lightmap,
+    layers: Vec<Layer>,
+}
+
+/// One set of maps.
+struct Layer {
+    include: Include,
+    maps: Finished,
+    /// The error of luxels by its parts, and what bilinear filtering adds.
+    stated: StatedError,
     error: manifest::Error,
-    adaptive: Adaptive,
+    /// Of light: where the flux goes, and patches of the solution.
+    energy: Option<manifest::Energy>,
+    patches: usize,
 }
 
 impl Bake {
     pub(super) fn run(self, session: &mut Session<'_>) -> Result<ExitCode, Failure> {
+        self.check_options()?;
         let folder = OutputFolder::prepare(&self.output)?;
         let loaded = scene::read_with_origin(&self.scene, &session.context)?;
         let scene = &loaded.scene;
         let context = &session.context;
         let goal = context.common.goal(context.started);
         Footprint::to_prepare(scene).require(context, || None)?;
-        let baked = context.common.install(|| {
+        let delivered = context.common.install(|| {
             let world = World::new(scene);
-            scene::require_light(&world)?;
-            let Some(baked) = self.bake(&world, context)? else {
+            if self.include.iter().any(|include| *include != Include::Ao) {
+                scene::require_light(&world)?;
+            }
+            let Some(baked) = self.bake(&world, &goal, context)? else {
                 return Ok(None);
             };
             let delivery = Delivery {
@@ -137,45 +171,102 @@ impl Bake {
                 origin: loaded.origin.as_ref(),
                 baked: &baked,
                 target: self.target,
-                include: super::name(&self.include),
                 seed: context.common.seed,
             };
             let manifest = delivery.write()?;
-            Ok::<_, Failure>(Some((manifest, stated(&baked))))
+            Ok::<_, Failure>(Some((manifest, baked.layers)))
         })??;
-        let Some((manifest, error)) = baked else {
+        let Some((manifest, layers)) = delivered else {
             return Ok(ExitCode::Interrupted);
         };
+        self.report(&manifest, &layers, &goal, session)?;
+        let missed = layers
+            .iter()
+            .map(|layer| layer.stated.exit(Some(&goal)))
+            .find(|exit| *exit != ExitCode::Ok);
+        Ok(if session.context.interrupt.is_set() {
+            ExitCode::Interrupted
+        } else {
+            missed.unwrap_or(ExitCode::Ok)
+        })
+    }
+
+    /// Refuses options that would have no effect.
+    fn check_options(&self) -> Result<(), Failure> {
+        let mut kinds = self.include.clone();
+        kinds.sort_by_key(|include| *include as u8);
+        kinds.dedup();
+        let problem = if self.max_distance.is_some() && !self.include.contains(&Include::Ao) {
+            "--max-distance belongs to --include ao"
+        } else if kinds.len() < self.include.len() {
+            "--include names the same twice"
+        } else {
+            return Ok(());
+        };
+        Err(Failure::new(ExitCode::Usage, problem))
+    }
+
+    /// Tells what was delivered, and how right it is.
+    fn report(
+        &self,
+        manifest: &Manifest,
+        layers: &[Layer],
+        goal: &Goal,
+        session: &mut Session<'_>,
+    ) -> Result<(), Failure> {
+        let context = &session.context;
         let seconds = context.started.elapsed().as_secs_f64();
+        for layer in layers {
+            context.reporter.note(format_args!(
+                "{}: {}; between texels filtering leaves {:.2} %",
+                super::name(&layer.include),
+                layer.stated.summary(Some(goal)),
+                100.0 * layer.error.filtering,
+            ));
+        }
         context.reporter.note(format_args!(
-            "{} luxels on {} page(s), {:.1} texels a metre, {seconds:.2} s{}; {}; between texels filtering leaves {:.2} %",
+            "{} luxels on {} page(s) of {} × {}, {:.1} texels a metre, {seconds:.2} s{}",
             manifest.atlas.lit,
             manifest.pages.len(),
+            manifest.atlas.width,
+            manifest.atlas.height,
             manifest.atlas.texels_per_metre,
             memory::peak_in_words(),
-            error.summary(Some(&goal)),
-            100.0 * manifest.error.filtering,
         ));
+        for object in &manifest.objects {
+            context.reporter.detail(format_args!(
+                "{}: {:.3} m², {:.1} texels a metre",
+                object.name, object.area, object.texels_per_metre
+            ));
+        }
         let text = if context.common.json {
-            let mut json = serde_json::to_value(&manifest)?;
+            let mut json = serde_json::to_value(manifest)?;
             json["seconds"] = seconds.into();
-            json["target_error"] = error.to_json(Some(&goal));
+            json["stated"] = layers
+                .iter()
+                .map(|layer| {
+                    (
+                        super::name(&layer.include),
+                        layer.stated.to_json(Some(goal)),
+                    )
+                })
+                .collect::<serde_json::Map<_, _>>()
+                .into();
             memory::add_peak(&mut json);
             serde_json::to_string_pretty(&json)?
         } else {
             self.output.join("manifest.json").display().to_string()
         };
-        session.print(&text)?;
-        Ok(if session.context.interrupt.is_set() {
-            ExitCode::Interrupted
-        } else {
-            error.exit(Some(&goal))
-        })
+        session.print(&text)
     }
 
-    /// Bakes a scene; `None` when it was stopped before there was any light.
-    fn bake(&self, world: &World<'_>, context: &Context<'_>) -> Result<Option<Baked>, Failure> {
-        let goal = context.common.goal(context.started);
+    /// Bakes a scene; `None` when it was stopped before all maps were had.
+    fn bake(
+        &self,
+        world: &World<'_>,
+        goal: &Goal,
+        context: &Context<'_>,
+    ) -> Result<Option<Baked>, Failure> {
         let atlas = self.places(world, context)?;
         let luxels = Luxels::new(world, &atlas, self.backface_tolerance);
         let count = luxels.lit.luxels.len();
@@ -188,54 +279,53 @@ impl Bake {
                 ),
             ));
         }
-        let held = self.require_memory(world, &atlas, count, &goal, context)?;
-        let error = first_error(Some(&goal));
-        let first = self.first_patches(error);
-        let config = AdaptiveConfig {
-            error,
-            components: self.include.into(),
-            most_patches: held.most_patches(world.scene(), first, context),
-            seed: context.common.seed,
-        };
-        let mut steering = Steering::new(context, Some(&goal));
-        let Some(found) = bake::bake(world, &luxels, &config, &mut steering)? else {
-            return Ok(None);
-        };
-        if found.adaptive.ending == Ending::TooManyPatches {
-            held_back(context);
+        let held = self.require_memory(world, &atlas, count, goal, context)?;
+        let mut layers = Vec::new();
+        for &include in &self.include {
+            let gathered = match include.components() {
+                Some(components) => self.light(world, &luxels, components, &held, goal, context)?,
+                None => self.occlusion(world, &luxels, goal, context),
+            };
+            let Some(gathered) = gathered else {
+                return Ok(None);
+            };
+            layers.push(self.layer(world, &atlas, &luxels, include, gathered));
         }
+        Ok(Some(Baked {
+            atlas,
+            luxels,
+            layers,
+        }))
+    }
+
+    /// Makes maps of what was gathered.
+    fn layer(
+        &self,
+        world: &World<'_>,
+        atlas: &Atlas,
+        luxels: &Luxels,
+        include: Include,
+        gathered: AtLuxels,
+    ) -> Layer {
         let smoothing = match self.denoise {
             Denoise::None => Smoothing::None,
             Denoise::Builtin => Smoothing::NonLocalMeans,
         };
-        let Finished { raw, map } =
-            bake::finish(world.scene(), &atlas, &luxels, &found.gathered, smoothing);
-        let [of_luxels, total] = [&raw, &map].map(bake::relative_error);
-        Ok(Some(Baked {
+        let maps = bake::finish(world.scene(), atlas, luxels, &gathered.values, smoothing);
+        let [of_luxels, total] = [&maps.raw, &maps.map].map(bake::relative_error);
+        Layer {
+            include,
+            maps,
+            stated: gathered.stated,
             error: manifest::Error {
                 luxels: of_luxels,
                 filtering: (total * total - of_luxels * of_luxels).max(0.0).sqrt(),
                 total,
             },
-            atlas,
-            luxels,
-            raw,
-            map,
-            adaptive: found.adaptive,
-        }))
+            energy: gathered.energy,
+            patches: gathered.patches,
+        }
     }
-}
-
-/// The error of the light at luxels: what was asked for.
-fn stated(baked: &Baked) -> StatedError {
-    let lit = baked
-        .raw
-        .lit()
-        .map(|texel| baked.raw.values[texel].element_sum());
-    let level = lit.sum::<f64>() / (3.0 * baked.raw.lit().count() as f64);
-    let bound = baked.adaptive.solver_bound;
-    let solver = if level > 0.0 { bound / level } else { 0.0 };
-    StatedError::of_gather(&baked.adaptive.parts, solver)
 }
 
 /// Texels a metre, the root mean square over all surfaces that have texels.

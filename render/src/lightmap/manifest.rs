@@ -18,14 +18,14 @@ pub struct Manifest {
     pub software: String,
     /// Name of the scene.
     pub scene: String,
-    /// Which light the maps hold: `all`, `direct` or `indirect`.
-    pub include: String,
-    /// What a texel holds.
+    /// What a texel of light holds; occlusion is from 0 to 1 (open).
     pub units: Units,
     /// Factor from what is seen, L = ρE/π, to display values of 0 to 1, as in the preview.
     pub exposure: f64,
-    /// The maps.
+    /// The maps of the first layer.
     pub pages: Vec<Page>,
+    /// All sets of maps.
+    pub layers: Vec<Layer>,
     /// How the scene is sampled.
     pub atlas: Sampling,
     /// Every object with the place that it has.
@@ -34,14 +34,23 @@ pub struct Manifest {
     pub files: Files,
     /// Numbers that Bevy wants.
     pub bevy: Option<Bevy>,
+    /// Seed of all randomness.
+    pub seed: u64,
+}
+
+/// A set of maps, a page each.
+#[derive(Clone, Debug, Serialize)]
+pub struct Layer {
+    /// What they hold: `all`, `direct` or `indirect` light, or `ao`.
+    pub include: String,
+    /// The maps.
+    pub pages: Vec<Page>,
     /// Errors relative to the mean of the luxels, one standard deviation.
     pub error: Error,
-    /// Where the flux goes, in W (lm) by channel; `None` for direct light alone.
+    /// Where the flux goes, in W (lm) by channel; `None` where no reflected light was asked for.
     pub energy: Option<Energy>,
     /// Patches of the radiosity solution.
     pub patches: usize,
-    /// Seed of all randomness.
-    pub seed: u64,
 }
 
 /// What a texel holds.
@@ -78,6 +87,10 @@ pub struct Page {
 /// How the scene is sampled.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Sampling {
+    /// Width of a page in texels.
+    pub width: usize,
+    /// Height of a page in texels.
+    pub height: usize,
     /// Texels a metre, the root mean square over all surfaces.
     pub texels_per_metre: f64,
     /// Share of the texels that surfaces lie on.

@@ -1,12 +1,13 @@
 //! Writes the folder of a bake, each file whole or not at all and the manifest last: a folder with a manifest is complete.
 
-use super::{Baked, texels_per_metre};
+use super::{Baked, Include, Layer, texels_per_metre};
 use crate::camera::CameraFrame;
 use crate::cli::exit::Failure;
 use crate::files::OutputFolder;
 use crate::image::exr::{self, Picture};
 use crate::image::{Image, png};
 use crate::integrators::{Samples, expose};
+use crate::lightmap::bake::Finished;
 use crate::lightmap::export::glb::glb;
 use crate::lightmap::export::obj::obj;
 use crate::lightmap::manifest::{self, Bevy, Files, Manifest, Page, Sampling, Units};
@@ -31,45 +32,46 @@ pub(super) struct Delivery<'a> {
     pub(super) origin: Option<&'a GltfOrigin>,
     pub(super) baked: &'a Baked,
     pub(super) target: Target,
-    pub(super) include: String,
     pub(super) seed: u64,
 }
 
 impl Delivery<'_> {
     /// Writes everything. Returns the manifest.
     pub(super) fn write(&self) -> Result<Manifest, Failure> {
-        let Baked {
-            atlas,
-            map,
-            raw,
-            luxels,
-            ..
-        } = self.baked;
         let scene = self.world.scene();
+        let Baked { atlas, layers, .. } = self.baked;
         // An older manifest does not speak of what is written now.
         self.folder.remove("manifest.json")?;
-        let pages: Vec<Page> = (0..atlas.pages).map(|page| self.page(page)).collect();
-        let factor = self.target.quantity().factor();
-        let scaled =
-            |values: &[Rgb]| -> Vec<Rgb> { values.iter().map(|value| *value * factor).collect() };
-        let (values, errors) = (scaled(&map.values), scaled(&map.errors));
-        for (index, page) in pages.iter().enumerate() {
-            self.picture(&page.file, map.page(index, &values), Vec::new())?;
-            self.picture(&page.error, map.page(index, &errors), Vec::new())?;
-            let error = ("error".to_owned(), raw.page(index, &raw.errors));
-            self.picture(&page.luxels, raw.page(index, &raw.values), vec![error])?;
-            let samples = picture::page(atlas, &luxels.triangles, map, index);
-            let name = if index == 0 {
-                "atlas.png".to_owned()
+        let mut described = Vec::new();
+        for (index, layer) in layers.iter().enumerate() {
+            let include = crate::cli::name(&layer.include);
+            let stem = if index == 0 {
+                "lightmap"
             } else {
-                format!("atlas_{index:03}.png")
+                include.as_str()
             };
-            self.folder
-                .write(&name, &png::encode_rgb8(&samples, atlas.size)?)?;
+            let pages: Vec<Page> = (0..atlas.pages).map(|page| self.page(stem, page)).collect();
+            self.write_maps(layer, &pages)?;
+            described.push(manifest::Layer {
+                include,
+                pages,
+                error: layer.error,
+                energy: layer.energy,
+                patches: layer.patches,
+            });
         }
-        let names: Vec<String> = pages.iter().map(|page| page.file.clone()).collect();
+        let first = &layers[0].maps.map;
+        for page in 0..atlas.pages {
+            let samples = picture::page(atlas, &self.baked.luxels.triangles, first, page);
+            let name = format!("atlas_{page:03}.png");
+            let name = if page == 0 { "atlas.png" } else { &name };
+            self.folder
+                .write(name, &png::encode_rgb8(&samples, atlas.size)?)?;
+        }
+        let files = described[0].pages.iter().map(|page| page.file.clone());
+        let files: Vec<String> = files.collect();
         self.folder
-            .write("scene.glb", &glb(scene, self.origin, atlas, &names)?)?;
+            .write("scene.glb", &glb(scene, self.origin, atlas, &files)?)?;
         let (geometry, materials) = obj(scene, atlas, "scene.mtl");
         self.folder.write("scene.mtl", &materials)?;
         self.folder.write("scene.obj", &geometry)?;
@@ -77,7 +79,7 @@ impl Delivery<'_> {
         let tone_map = ToneMap::automatic(&preview);
         self.folder
             .write("preview.png", &png::encode(&preview, tone_map)?)?;
-        let manifest = self.manifest(pages, f64::from(tone_map.exposure));
+        let manifest = self.manifest(described, f64::from(tone_map.exposure));
         if let Some((name, text)) = self.target.snippet() {
             let exposure = manifest.bevy.map_or(1.0, |bevy| bevy.lightmap_exposure);
             let text = text.replace("{lightmap_exposure}", &format!("{exposure:?}"));
@@ -89,14 +91,33 @@ impl Delivery<'_> {
         Ok(manifest)
     }
 
-    fn page(&self, page: usize) -> Page {
+    fn page(&self, stem: &str, page: usize) -> Page {
         Page {
-            file: format!("lightmap_{page:03}.exr"),
-            error: format!("lightmap_{page:03}_error.exr"),
-            luxels: format!("luxels_{page:03}.exr"),
+            file: format!("{stem}_{page:03}.exr"),
+            error: format!("{stem}_{page:03}_error.exr"),
+            luxels: format!("{stem}_{page:03}_luxels.exr"),
             width: self.baked.atlas.size[0],
             height: self.baked.atlas.size[1],
         }
+    }
+
+    /// Writes the files of a set of maps.
+    fn write_maps(&self, layer: &Layer, pages: &[Page]) -> Result<(), Failure> {
+        let Finished { raw, map } = &layer.maps;
+        let factor = match layer.include {
+            Include::Ao => 1.0,
+            Include::All | Include::Direct | Include::Indirect => self.target.quantity().factor(),
+        };
+        let scaled =
+            |values: &[Rgb]| -> Vec<Rgb> { values.iter().map(|value| *value * factor).collect() };
+        let (values, errors) = (scaled(&map.values), scaled(&map.errors));
+        for (index, page) in pages.iter().enumerate() {
+            self.picture(&page.file, map.page(index, &values), Vec::new())?;
+            self.picture(&page.error, map.page(index, &errors), Vec::new())?;
+            let error = ("error".to_owned(), raw.page(index, &raw.errors));
+            self.picture(&page.luxels, raw.page(index, &raw.values), vec![error])?;
+        }
+        Ok(())
     }
 
     fn picture(
@@ -122,26 +143,24 @@ impl Delivery<'_> {
             .cloned()
             .unwrap_or_else(|| overview(scene));
         let frame = CameraFrame::new(&camera, camera.size)?;
-        let view = LightmapView::new(self.world, &self.baked.atlas, &self.baked.map);
+        let view = LightmapView::new(
+            self.world,
+            &self.baked.atlas,
+            &self.baked.layers[0].maps.map,
+        );
         let samples = Samples::new(PREVIEW_SAMPLES, self.seed);
         Ok(expose(&view, &frame, samples, &Silent).mean())
     }
 
-    fn manifest(&self, pages: Vec<Page>, exposure: f64) -> Manifest {
-        let Baked {
-            atlas,
-            map,
-            error,
-            adaptive,
-            ..
-        } = self.baked;
+    fn manifest(&self, layers: Vec<manifest::Layer>, exposure: f64) -> Manifest {
+        let Baked { atlas, .. } = self.baked;
+        let map = &self.baked.layers[0].maps.map;
         let scene = self.world.scene();
         let quantity = self.target.quantity();
         Manifest {
             schema: 1,
             software: concat!("luxel ", env!("CARGO_PKG_VERSION")).into(),
             scene: scene.name.clone(),
-            include: self.include.clone(),
             units: Units {
                 quantity,
                 unit: match scene.units {
@@ -153,8 +172,11 @@ impl Delivery<'_> {
                 target: self.target,
             },
             exposure,
-            pages,
+            pages: layers[0].pages.clone(),
+            layers,
             atlas: Sampling {
+                width: atlas.size[0],
+                height: atlas.size[1],
                 texels_per_metre: texels_per_metre(atlas, scene),
                 utilisation: atlas.utilisation(scene),
                 charts: atlas.charts.len(),
@@ -174,9 +196,6 @@ impl Delivery<'_> {
                 atlas: "atlas.png".into(),
             },
             bevy: (self.target == Target::Bevy).then(|| Bevy::new(scene.units, exposure)),
-            error: *error,
-            energy: adaptive.ledger.map(Into::into),
-            patches: adaptive.patches,
             seed: self.seed,
         }
     }

@@ -11,16 +11,22 @@ use crate::lightmap::atlas::Atlas;
 use crate::lightmap::luxels::Luxel;
 use crate::lightmap::map::Lightmap;
 use luxel_solver::adaptive;
-use luxel_solver::gather::Gathered;
+use luxel_solver::gather::{Components, Gathered};
 use luxel_solver::world::{Receiver, World};
 
 impl Bake {
     /// Patches of the mesh that is begun with.
     pub(super) fn first_patches(&self, error: f64) -> usize {
-        if self.include == Include::Direct {
-            0
-        } else {
+        let has_indirect = |include: &Include| {
+            matches!(
+                include.components(),
+                Some(Components::All | Components::Indirect)
+            )
+        };
+        if self.include.iter().any(has_indirect) {
             adaptive::first_patches(error)
+        } else {
+            0
         }
     }
 
@@ -44,7 +50,7 @@ impl Bake {
             )
             .with(
                 "maps",
-                2 * Lightmap::bytes_for(texels) + Picture::bytes_for(page, 1),
+                2 * self.include.len() * Lightmap::bytes_for(texels) + Picture::bytes_for(page, 1),
             );
         let with_mesh = |error: f64| {
             let patches = self.first_patches(error);

@@ -1,0 +1,113 @@
+//! What luxels see: light by the final gather, or how open they are.
+
+use super::Bake;
+use crate::cli::Context;
+use crate::cli::exit::Failure;
+use crate::cli::footprint::{Footprint, held_back};
+use crate::cli::goal::Goal;
+use crate::cli::refine::refine;
+use crate::cli::stated::StatedError;
+use crate::cli::steering::{Steering, first_error};
+use crate::film::{Alike, Film};
+use crate::integrators::ao::{AmbientOcclusion, Config};
+use crate::lightmap::bake::{self, Luxels};
+use crate::lightmap::manifest;
+use crate::progress::Progress;
+use luxel_scenes::Irradiance;
+use luxel_solver::adaptive::{AdaptiveConfig, Ending};
+use luxel_solver::gather::{Components, Gathered, MAX_REPLICATES};
+use luxel_solver::world::World;
+
+/// Rays of a sample of ambient occlusion, and the samples of each replicate that are begun with.
+const AO_RAYS: u32 = 4;
+const FIRST_AO_SAMPLES: u32 = 2;
+
+/// Values at luxels with their errors.
+pub(super) struct AtLuxels {
+    pub(super) values: Vec<Gathered>,
+    pub(super) stated: StatedError,
+    pub(super) energy: Option<manifest::Energy>,
+    pub(super) patches: usize,
+}
+
+impl Bake {
+    /// Light; `None` when it was stopped before there was any.
+    pub(super) fn light(
+        &self,
+        world: &World<'_>,
+        luxels: &Luxels,
+        components: Components,
+        held: &Footprint,
+        goal: &Goal,
+        context: &Context<'_>,
+    ) -> Result<Option<AtLuxels>, Failure> {
+        let error = first_error(Some(goal));
+        let first = self.first_patches(error);
+        let config = AdaptiveConfig {
+            error,
+            components,
+            most_patches: held.most_patches(world.scene(), first, context),
+            seed: context.common.seed,
+        };
+        let mut steering = Steering::new(context, Some(goal));
+        let Some(found) = bake::bake(world, luxels, &config, &mut steering)? else {
+            return Ok(None);
+        };
+        if found.adaptive.ending == Ending::TooManyPatches {
+            held_back(context);
+        }
+        let sum: f64 = found
+            .gathered
+            .iter()
+            .map(|gathered| gathered.irradiance().0.element_sum())
+            .sum();
+        let level = sum / (3.0 * found.gathered.len() as f64);
+        let bound = found.adaptive.solver_bound;
+        let solver = if level > 0.0 { bound / level } else { 0.0 };
+        Ok(Some(AtLuxels {
+            stated: StatedError::of_gather(&found.adaptive.parts, solver),
+            energy: found.adaptive.ledger.map(Into::into),
+            patches: found.adaptive.patches,
+            values: found.gathered,
+        }))
+    }
+
+    /// Ambient occlusion; `None` when it was stopped before there was any.
+    pub(super) fn occlusion(
+        &self,
+        world: &World<'_>,
+        luxels: &Luxels,
+        goal: &Goal,
+        context: &Context<'_>,
+    ) -> Option<AtLuxels> {
+        let receivers = &luxels.lit.receivers;
+        let config = Config {
+            rays: AO_RAYS,
+            max_distance: self.max_distance,
+            falloff: self.falloff,
+            seed: context.common.seed,
+        };
+        let occlusion = AmbientOcclusion::new(world, config);
+        let add = |film: &mut Film, samples: &[u32], progress: &dyn Progress| {
+            occlusion.at_receivers(film, receivers, samples, progress);
+        };
+        let mut steering = Steering::new(context, Some(goal));
+        let mut film = Film::new([receivers.len(), 1], MAX_REPLICATES as u32);
+        let (first, goal) = (FIRST_AO_SAMPLES, Some(goal));
+        let error = refine(&mut film, first, Alike::Values, goal, &mut steering, add)?;
+        let rays = film.sample_counts().max * AO_RAYS;
+        let errors = film.errors(Alike::Fractions { rays })?;
+        // Openness has a value and a noise, as direct light has.
+        let value = |(value, error): (_, &crate::film::PixelError)| Gathered {
+            direct: Irradiance(value),
+            direct_noise: Irradiance(error.total()),
+            ..Gathered::default()
+        };
+        Some(AtLuxels {
+            values: film.values().zip(&errors).map(value).collect(),
+            stated: StatedError::of_samples(error.sampling, error.discretisation, 0.0),
+            energy: None,
+            patches: 0,
+        })
+    }
+}
