@@ -2,7 +2,7 @@
 //!
 //! Each lit texel p becomes a mean of texels q of its own chart around it, weighted by how alike their neighbourhoods are:
 //!
-//!   w(p, q) = exp(−max(0, d²(p, q))),   d² = mean over shifts n and channels of
+//!   w(p, q) = exp(−max(0, d²(p, q))),   d² = mean over n (3 × 3 texels) and channels of
 //!   ((u(p+n) − u(q+n))² − (V(p+n) + min(V(p+n), V(q+n)))) / (k² (V(p+n) + V(q+n))),
 //!
 //! with the variance V that the gather states. Differences that noise explains count nothing, so that flat light is averaged
@@ -10,23 +10,29 @@
 //! Biased: what is fainter than the noise is smoothed with it. The stated error of a texel is left as it was, an upper bound.
 //!
 //! Source: F. Rousselle, C. Knaus, M. Zwicker, "Adaptive Rendering with Non-Local Means Filtering", ACM TOG 31(6), 2012.
-//! Cost: about a thousand differences a noisy texel.
+//! Cost: some 120 differences a texel.
 
 use super::luxels::Luxel;
 use super::map::{Lightmap, Texel};
 use luxel_scenes::Rgb;
 use luxel_solver::gather::Gathered;
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// Texels on each side in which others are looked for, and those by which two are compared.
+/// Texels on each side in which others are looked for.
 const WINDOW: isize = 5;
-const PATCH: isize = 1;
 
 /// The k of the differences: the source's value for strong filtering.
 const STRENGTH: f64 = 0.6;
 
 /// Relative noise below which a texel is not worth the work.
 const NEGLIGIBLE: f64 = 0.002;
+
+/// Distance d² from which a weight counts as zero.
+const FAR: f64 = 16.0;
+
+/// Rows of texels that are smoothed at a time.
+const BAND: usize = 16;
 
 /// What noise there is, by texel.
 struct Noisy<'m> {
@@ -63,72 +69,136 @@ pub fn denoise(map: &mut Lightmap, luxels: &[Luxel], gathered: &[Gathered]) {
         noisy.charts[texel] = own[0].chart.0;
         noisy.variances[texel] = squares / (own.len() as f64).powi(2);
     }
-    let smoothed: Vec<Rgb> = (0..map.texels.len())
-        .into_par_iter()
-        .with_min_len(1024)
-        .map(|texel| noisy.smoothed(texel))
+    let [width, height] = map.size;
+    let bands: Vec<(usize, Range<usize>)> = (0..map.pages)
+        .flat_map(|page| {
+            let starts = (0..height).step_by(BAND);
+            starts.map(move |first| (page, first..(first + BAND).min(height)))
+        })
         .collect();
-    map.values = smoothed;
+    let smoothed: Vec<Vec<Rgb>> = bands
+        .into_par_iter()
+        .map(|(page, rows)| noisy.band(page * width * height, rows))
+        .collect();
+    map.values = smoothed.concat();
+}
+
+/// Weighted values of a band's texels so far.
+struct Sums {
+    values: Vec<Rgb>,
+    weights: Vec<f64>,
 }
 
 impl Noisy<'_> {
-    /// The value of a texel without its noise.
-    fn smoothed(&self, texel: usize) -> Rgb {
-        let value = self.map.values[texel];
-        let noise = self.variances[texel].element_sum().sqrt();
-        if self.map.texels[texel] != Texel::Lit || noise <= NEGLIGIBLE * value.element_sum() {
-            return value;
-        }
-        let (mut sum, mut weights) = (value, 1.0);
-        for dy in -WINDOW..=WINDOW {
-            for dx in -WINDOW..=WINDOW {
-                let Some(other) = self.beside(texel, dx, dy).filter(|&other| other != texel) else {
-                    continue;
-                };
-                let weight = (-self.difference(texel, other).max(0.0)).exp();
-                sum += self.map.values[other] * weight;
-                weights += weight;
-            }
-        }
-        sum / weights
-    }
-
-    /// The texel beside one, of the same chart.
-    fn beside(&self, texel: usize, dx: isize, dy: isize) -> Option<usize> {
-        let [width, height] = self.map.size;
-        let page = texel / (width * height);
-        let (column, row) = (texel % width, texel / width % height);
-        let column = column.checked_add_signed(dx).filter(|&x| x < width)?;
-        let row = row.checked_add_signed(dy).filter(|&y| y < height)?;
-        let other = (page * height + row) * width + column;
-        (self.charts[other] == self.charts[texel]).then_some(other)
-    }
-
-    /// How far two texels differ beyond their noise, d².
-    fn difference(&self, one: usize, other: usize) -> f64 {
-        let (mut sum, mut count) = (0.0, 0.0);
-        for dy in -PATCH..=PATCH {
-            for dx in -PATCH..=PATCH {
-                let (Some(p), Some(q)) = (self.beside(one, dx, dy), self.beside(other, dx, dy))
-                else {
-                    continue;
-                };
-                let difference = self.map.values[p] - self.map.values[q];
-                let square = difference * difference;
-                let (of_p, of_q) = (self.variances[p], self.variances[q]);
-                let beyond = square - (of_p + of_p.min(of_q));
-                let scale = STRENGTH.powi(2) * (of_p + of_q);
-                for channel in 0..3 {
-                    // Two values without noise are alike only where they are the same.
-                    sum += match (scale[channel] > 0.0, square[channel] > 0.0) {
-                        (true, _) => beyond[channel] / scale[channel],
-                        (false, true) => f64::INFINITY,
-                        (false, false) => 0.0,
-                    };
-                    count += 1.0;
+    /// The texels of some rows of a page, which begins at the texel `page`, without their noise.
+    fn band(&self, page: usize, rows: Range<usize>) -> Vec<Rgb> {
+        let width = self.map.size[0];
+        let first = page + rows.start * width;
+        let own = first..page + rows.end * width;
+        let worthwhile: Vec<bool> = own.clone().map(|texel| self.is_worthwhile(texel)).collect();
+        let mut sums = Sums {
+            values: self.map.values[own.clone()].to_vec(),
+            weights: vec![1.0; own.len()],
+        };
+        if worthwhile.contains(&true) {
+            for dy in -WINDOW..=WINDOW {
+                for dx in -WINDOW..=WINDOW {
+                    if (dx, dy) != (0, 0) {
+                        self.add_shifted(page, &rows, [dx, dy], &worthwhile, &mut sums);
+                    }
                 }
             }
         }
-        sum / count
+        let means = sums.values.iter().zip(sums.weights);
+        means.map(|(value, weight)| *value / weight).collect()
+    }
+
+    fn is_worthwhile(&self, texel: usize) -> bool {
+        let value = self.map.values[texel].element_sum();
+        let noise = self.variances[texel].element_sum().sqrt();
+        self.map.texels[texel] == Texel::Lit && noise > NEGLIGIBLE * value
+    }
+
+    /// Adds what lies beside the texels of some rows by one shift.
+    fn add_shifted(
+        &self,
+        page: usize,
+        rows: &Range<usize>,
+        shift: [isize; 2],
+        worthwhile: &[bool],
+        sums: &mut Sums,
+    ) {
+        let [width, height] = self.map.size;
+        // Differences of these rows and of those around them, each with its number of channels: none where there is no partner.
+        let around = rows.start.saturating_sub(1)..(rows.end + 1).min(height);
+        let mut differences = Vec::with_capacity(around.len() * width);
+        for row in around.clone() {
+            differences.extend((0..width).map(|column| {
+                let other = self.beside(page, [column, row], shift);
+                other.map_or([0.0; 2], |other| {
+                    [self.difference(page + row * width + column, other), 3.0]
+                })
+            }));
+        }
+        for row in rows.clone() {
+            for column in 0..width {
+                let in_band = (row - rows.start) * width + column;
+                if !worthwhile[in_band] {
+                    continue;
+                }
+                let Some(other) = self.beside(page, [column, row], shift) else {
+                    continue;
+                };
+                let (mut sum, mut count) = (0.0, 0.0);
+                for row in row.saturating_sub(1).max(around.start)..(row + 2).min(around.end) {
+                    let line = &differences[(row - around.start) * width..][..width];
+                    for [difference, channels] in
+                        &line[column.saturating_sub(1)..(column + 2).min(width)]
+                    {
+                        sum += difference;
+                        count += channels;
+                    }
+                }
+                let distance = sum / count;
+                if distance < FAR {
+                    let weight = (-distance.max(0.0)).exp();
+                    sums.values[in_band] += self.map.values[other] * weight;
+                    sums.weights[in_band] += weight;
+                }
+            }
+        }
+    }
+
+    /// The texel beside one, of the same chart.
+    fn beside(
+        &self,
+        page: usize,
+        [column, row]: [usize; 2],
+        [dx, dy]: [isize; 2],
+    ) -> Option<usize> {
+        let [width, height] = self.map.size;
+        let own = self.charts[page + row * width + column];
+        let column = column.checked_add_signed(dx).filter(|&x| x < width)?;
+        let row = row.checked_add_signed(dy).filter(|&y| y < height)?;
+        let other = page + row * width + column;
+        (own != NO_CHART && self.charts[other] == own).then_some(other)
+    }
+
+    /// How far two texels differ beyond their noise, the sum over the channels.
+    fn difference(&self, p: usize, q: usize) -> f64 {
+        let difference = self.map.values[p] - self.map.values[q];
+        let square = difference * difference;
+        let (of_p, of_q) = (self.variances[p], self.variances[q]);
+        let beyond = square - (of_p + of_p.min(of_q));
+        let scale = STRENGTH.powi(2) * (of_p + of_q);
+        let of_channel = |channel: usize| {
+            // Two values without noise are alike only where they are the same.
+            match (scale[channel] > 0.0, square[channel] > 0.0) {
+                (true, _) => beyond[channel] / scale[channel],
+                (false, true) => f64::INFINITY,
+                (false, false) => 0.0,
+            }
+        };
+        of_channel(0) + of_channel(1) + of_channel(2)
     }
 }
