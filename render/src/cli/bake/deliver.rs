@@ -59,13 +59,10 @@ impl Delivery<'_> {
             let error = ("error".to_owned(), raw.page(index, &raw.errors));
             self.picture(&page.luxels, raw.page(index, &raw.values), vec![error])?;
             let samples = picture::page(atlas, &luxels.triangles, map, index);
-            let name = if index == 0 {
-                "atlas.png".to_owned()
-            } else {
-                format!("atlas_{index:03}.png")
-            };
             self.folder
-                .write(&name, &png::encode_rgb8(&samples, atlas.size)?)?;
+                .write(&page.charts, &png::encode_rgb8(&samples, atlas.size)?)?;
+            let validity = png::encode_grey8(&raw.validity(index), atlas.size)?;
+            self.folder.write(&page.validity, &validity)?;
         }
         let names: Vec<String> = pages.iter().map(|page| page.file.clone()).collect();
         self.folder
@@ -94,6 +91,12 @@ impl Delivery<'_> {
             file: format!("lightmap_{page:03}.exr"),
             error: format!("lightmap_{page:03}_error.exr"),
             luxels: format!("luxels_{page:03}.exr"),
+            validity: format!("lightmap_{page:03}_validity.png"),
+            charts: if page == 0 {
+                "atlas.png".into()
+            } else {
+                format!("atlas_{page:03}.png")
+            },
             width: self.baked.atlas.size[0],
             height: self.baked.atlas.size[1],
         }
@@ -138,18 +141,18 @@ impl Delivery<'_> {
         let scene = self.world.scene();
         let quantity = self.target.quantity();
         Manifest {
-            schema: 1,
+            schema: manifest::SCHEMA,
             software: concat!("luxel ", env!("CARGO_PKG_VERSION")).into(),
             scene: scene.name.clone(),
             include: self.include.clone(),
             units: Units {
                 quantity,
                 unit: match scene.units {
-                    UnitSystem::Radiometric => "W/m2",
-                    UnitSystem::Photometric => "lx",
+                    UnitSystem::Radiometric => "W/m2".into(),
+                    UnitSystem::Photometric => "lx".into(),
                 },
                 factor: quantity.factor(),
-                colour_space: "linear Rec. 709",
+                colour_space: "linear Rec. 709".into(),
                 target: self.target,
             },
             exposure,
