@@ -121,15 +121,15 @@ impl Content {
                 })
             }
         };
-        let glb = bytes(place(&manifest.files.glb)?)?;
+        let glb = bytes(&place(&manifest.files.glb)?)?;
         let mut pages = Vec::new();
         for page in &manifest.pages {
             let size = [page.width, page.height];
             pages.push(Maps {
                 light: map(&place(&page.file)?, size)?,
                 error: map(&place(&page.error)?, size)?,
-                validity: grey(place(&page.validity)?, size)?,
-                charts: bytes(place(&page.charts)?)?,
+                validity: grey(&place(&page.validity)?, size)?,
+                charts: bytes(&place(&page.charts)?)?,
             });
         }
         Ok(Self {
@@ -146,8 +146,8 @@ fn is_absent(error: &std::io::Error) -> bool {
     matches!(error.kind(), NotFound | NotADirectory)
 }
 
-fn bytes(path: PathBuf) -> Result<Vec<u8>, ContentError> {
-    std::fs::read(&path).map_err(|error| ContentError::Unreadable(path, error))
+fn bytes(path: &Path) -> Result<Vec<u8>, ContentError> {
+    std::fs::read(path).map_err(|error| ContentError::Unreadable(path.to_path_buf(), error))
 }
 
 fn map(path: &Path, size: [usize; 2]) -> Result<Image, ContentError> {
@@ -156,13 +156,13 @@ fn map(path: &Path, size: [usize; 2]) -> Result<Image, ContentError> {
     Ok(image)
 }
 
-fn grey(path: PathBuf, size: [usize; 2]) -> Result<Vec<u8>, ContentError> {
-    let file = bytes(path.clone())?;
+fn grey(path: &Path, size: [usize; 2]) -> Result<Vec<u8>, ContentError> {
+    let file = bytes(path)?;
     let image = image::load_from_memory_with_format(&file, ImageFormat::Png)
-        .map_err(|error| ContentError::Picture(path.clone(), error))?
+        .map_err(|error| ContentError::Picture(path.to_path_buf(), error))?
         .to_luma8();
     let found = [image.width() as usize, image.height() as usize];
-    require_size(&path, found, size)?;
+    require_size(path, found, size)?;
     Ok(image.into_raw())
 }
 

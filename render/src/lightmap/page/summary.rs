@@ -12,7 +12,7 @@ const MOST_OBJECTS: usize = 500;
 pub(super) fn subtitle(manifest: &Manifest) -> String {
     let pages = manifest.pages.len();
     format!(
-        "{}, {} lit texels on {pages} page{}, ± {}",
+        "{}, {} lit texels on {pages} page{}, ±\u{a0}{}",
         escape(light(&manifest.include)),
         manifest.atlas.lit,
         if pages == 1 { "" } else { "s" },
@@ -79,7 +79,7 @@ fn texels(manifest: &Manifest) -> String {
         ("texels a metre", figure(atlas.texels_per_metre)),
         ("covered by surfaces", percent(atlas.utilisation)),
         ("charts", atlas.charts.to_string()),
-        ("padding", format!("{} texels", atlas.padding)),
+        ("texels of padding", atlas.padding.to_string()),
         ("lit", atlas.lit.to_string()),
         (
             "buried",
@@ -176,7 +176,7 @@ fn name(target: Target) -> String {
 }
 
 fn percent(share: f64) -> String {
-    format!("{} %", figure(100.0 * share))
+    format!("{}\u{a0}%", figure(100.0 * share))
 }
 
 /// Three significant digits.

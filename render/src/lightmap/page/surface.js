@@ -54,6 +54,8 @@ function makePage({ width, height, scale, light, info, charts }) {
     texture.minFilter = THREE.NearestFilter;
     texture.magFilter = THREE.NearestFilter;
   }
+  page.light.minFilter = THREE.LinearFilter;
+  page.light.magFilter = THREE.LinearFilter;
   page.light.needsUpdate = true;
   page.info.needsUpdate = true;
   page.loaded = new Promise((resolve) => {
@@ -77,13 +79,14 @@ function makePage({ width, height, scale, light, info, charts }) {
   return page;
 }
 
+// `centroid`: beside an edge the middle of a pixel lies beyond the surface, in what may be another chart.
 const VERTEX = `
 attribute vec2 lightUv;
 attribute vec2 mapUv;
 attribute vec2 emissiveUv;
 uniform mat3 mapTransform;
 uniform mat3 emissiveTransform;
-varying vec2 vLightUv;
+centroid varying vec2 vLightUv;
 varying vec2 vMapUv;
 varying vec2 vEmissiveUv;
 varying vec3 vNormal;
@@ -126,7 +129,7 @@ uniform float opacity;
 uniform float alphaTest;
 uniform vec2 errorRange;
 uniform vec3 ramp[5];
-varying vec2 vLightUv;
+centroid varying vec2 vLightUv;
 varying vec2 vMapUv;
 varying vec2 vEmissiveUv;
 varying vec3 vNormal;
@@ -154,7 +157,7 @@ float checker() {
   vec2 cell = floor(texel);
   float fine = max(length(dFdx(texel)), length(dFdy(texel)));
   float sides = mod(cell.x + cell.y, 2.0) < 0.5 ? 1.0 : -1.0;
-  return sides * (1.0 - smoothstep(0.25, 0.6, fine));
+  return sides * (1.0 - smoothstep(0.35, 0.8, fine));
 }
 
 void main() {
