@@ -3,7 +3,7 @@
 //! | consumer | its shader | so a texel holds |
 //! |---|---|---|
 //! | raw | | E |
-//! | three.js (since r152) | irradiance += texel · lightMapIntensity, × albedo / π | E |
+//! | three.js (since r155) | irradiance += texel · lightMapIntensity, × albedo / π | E |
 //! | Bevy | diffuse += texel · lightmap_exposure · albedo, × exposure of the view | E/π |
 //! | Godot 4 | ambient += texel, × albedo | E/π |
 //! | Blender | emission of texel · albedo | E/π |

@@ -1,4 +1,4 @@
-// Shows a scene with the lightmaps that luxel baked: three.js r152 or later.
+// Shows a scene with the lightmaps that luxel baked: three.js r155 or later.
 //
 //   import { loadBaked } from './three.js';
 //   const { scene, manifest } = await loadBaked('baked/');
