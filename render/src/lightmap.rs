@@ -4,7 +4,7 @@
 //! them ([`luxels`]), the points become receivers ([`receivers`]), light is gathered there ([`bake`]), and what lies
 //! between and beside the charts is filled ([`dilation`]) and fitted ([`fit`], [`seams`]) so that filtered look-ups are right.
 //! [`lookup`] is how an engine reads the result, [`view`] how it shows it, and [`mod@target`] what it wants texels to hold;
-//! [`export`] writes the scene with its new coordinates, [`manifest`] what is where.
+//! [`export`] writes the scene with its new coordinates, [`manifest`] what is where, [`mod@page`] all of it as a page to look at.
 
 pub mod atlas;
 pub mod bake;
@@ -17,6 +17,7 @@ pub mod lookup;
 pub mod luxels;
 pub mod manifest;
 pub mod map;
+pub mod page;
 pub mod picture;
 pub mod receivers;
 pub mod seams;

@@ -12,7 +12,7 @@ mod classical;
 pub mod exact;
 pub mod false_colour;
 pub mod family;
-mod html;
+pub(crate) mod html;
 pub mod machine;
 mod measure;
 mod memory;

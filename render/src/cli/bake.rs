@@ -227,7 +227,7 @@ impl Bake {
         context.reporter.note(format_args!(
             "{} luxels on {} page(s) of {} × {}, {:.1} texels a metre, {seconds:.2} s{}",
             manifest.atlas.lit,
-            manifest.pages.len(),
+            manifest.lightmap.pages.len(),
             manifest.atlas.width,
             manifest.atlas.height,
             manifest.atlas.texels_per_metre,

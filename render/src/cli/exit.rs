@@ -1,5 +1,6 @@
 //! How the command ends.
 
+use crate::lightmap::page::ContentError;
 use crate::points::PointsError;
 use std::error::Error;
 
@@ -72,6 +73,16 @@ impl From<PointsError> for Failure {
         let exit = match error {
             PointsError::Unreadable(..) => ExitCode::Failure,
             PointsError::Empty(_) => ExitCode::NothingToDo,
+            _ => ExitCode::InvalidInput,
+        };
+        Self::new(exit, error)
+    }
+}
+
+impl From<ContentError> for Failure {
+    fn from(error: ContentError) -> Self {
+        let exit = match error {
+            ContentError::Unreadable(..) => ExitCode::Failure,
             _ => ExitCode::InvalidInput,
         };
         Self::new(exit, error)

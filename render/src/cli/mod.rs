@@ -24,6 +24,7 @@ mod solve;
 mod stated;
 mod steering;
 mod transport;
+mod view;
 
 pub use exit::ExitCode;
 pub use interrupt::Interrupt;
@@ -52,6 +53,7 @@ enum Verb {
     Solve(solve::Solve),
     Probe(probe::Probe),
     Bake(bake::Bake),
+    View(view::View),
     FormFactors(form_factors::FormFactors),
     Converge(converge::Converge),
     Check(check::Check),
@@ -124,6 +126,7 @@ pub fn run_with(
         Verb::Solve(verb) => verb.run(&mut session),
         Verb::Probe(verb) => verb.run(&mut session),
         Verb::Bake(verb) => verb.run(&mut session),
+        Verb::View(verb) => verb.run(&mut session),
         Verb::FormFactors(verb) => verb.run(&mut session),
         Verb::Converge(verb) => verb.run(&mut session),
         Verb::Check(verb) => verb.run(&mut session),

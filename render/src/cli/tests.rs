@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 mod converge;
 mod results;
+mod view;
 mod views;
 
 /// Runs the command and returns exit code, stdout and stderr.

@@ -31,13 +31,27 @@ pub fn encode(image: &Image, tone_map: ToneMap) -> Result<Vec<u8>, EncodePngErro
 /// # Panics
 /// When there are not three samples per pixel.
 pub fn encode_rgb8(samples: &[u8], size: [usize; 2]) -> Result<Vec<u8>, EncodePngError> {
+    encode_samples(samples, size, ExtendedColorType::Rgb8)
+}
+
+/// The bytes of a PNG file of `size` (width, height) pixels with one sample each, row by row from the top.
+///
+/// # Errors
+/// When there are no pixels or more than PNG can hold.
+///
+/// # Panics
+/// When there is not one sample per pixel.
+pub fn encode_grey8(samples: &[u8], size: [usize; 2]) -> Result<Vec<u8>, EncodePngError> {
+    encode_samples(samples, size, ExtendedColorType::L8)
+}
+
+fn encode_samples(
+    samples: &[u8],
+    size: [usize; 2],
+    colour: ExtendedColorType,
+) -> Result<Vec<u8>, EncodePngError> {
     let mut bytes = Vec::new();
-    PngEncoder::new(&mut bytes).write_image(
-        samples,
-        size[0] as u32,
-        size[1] as u32,
-        ExtendedColorType::Rgb8,
-    )?;
+    PngEncoder::new(&mut bytes).write_image(samples, size[0] as u32, size[1] as u32, colour)?;
     Ok(bytes)
 }
 

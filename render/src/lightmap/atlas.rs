@@ -45,7 +45,7 @@ pub struct Atlas {
 }
 
 /// A rectangle of texels: first column and row, and those behind the last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Rectangle {
     /// The page, from zero.
     pub page: u32,

@@ -7,7 +7,7 @@
 //!
 //! a, b and c the weights of [`lookup::taps`]. Texels with light found at their centre have w = 1 and are moved by seams alone, so
 //! that nothing leaks through a wall between two luxels; those that only filtering reads are nearly free. x⁰ is what
-//! [`super::dilation`] filled in, and no texel becomes more than twice that: linear continuation needs no more.
+//! [`super::dilation`] filled in, and no texel becomes less than a quarter or more than twice of that.
 //!
 //! Sources: S. Iwanicki, "Lighting Technology of The Last of Us", SIGGRAPH 2013 talks (seams); M. R. Hestenes, E. Stiefel,
 //! "Methods of Conjugate Gradients for Solving Linear Systems", 1952, here with a diagonal preconditioner. Cost: a few
@@ -26,6 +26,11 @@ const SEAM_WEIGHT: f64 = 30_000.0;
 
 /// Weight w of a texel without light of its own.
 const FREE_WEIGHT: f64 = 0.02;
+
+/// What a texel may become of what was filled in. Linear continuation needs no more; further, and what a point at an edge tells by
+/// chance is continued into black or glare.
+const LOWEST: f64 = 0.25;
+const HIGHEST: f64 = 2.0;
 
 /// Iterations after which the solution is as good as it gets, and the share of the first residual at which it ends.
 const MAX_ITERATIONS: usize = 1000;
@@ -92,7 +97,7 @@ pub fn fit(atlas: &Atlas, map: &mut Lightmap, luxels: &[Luxel], values: &[Rgb], 
     let found: Vec<Rgb> = texels.iter().map(|&texel| map.values[texel]).collect();
     for (&texel, change) in texels.iter().zip(system.changes(&found)) {
         let value = map.values[texel];
-        map.values[texel] = (value + change).clamp(Rgb::ZERO, 2.0 * value);
+        map.values[texel] = (value + change).clamp(LOWEST * value, HIGHEST * value);
     }
 }
 

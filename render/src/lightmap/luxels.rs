@@ -38,8 +38,9 @@ impl Luxel {
 /// Width in texels of a strip of a texel that is too narrow to give it light: rounding makes such.
 const MARGIN: f64 = 0.01;
 
-/// How far from an edge, in texels, points are that would lie on it.
-const INSET: f64 = 0.05;
+/// How far from an edge, in texels, points are that would lie on it. Nearer, and the last millimetres below a ceiling would speak for
+/// a whole texel.
+const INSET: f64 = 0.25;
 
 /// A triangle of a chart in texels of its page.
 #[derive(Clone, Copy, Debug)]
@@ -105,8 +106,8 @@ impl Placed {
         [0, 1].map(|axis| low[axis] as usize..(high[axis] as usize).min(size[axis]))
     }
 
-    /// The place of the triangle nearest to `place`, but not on its edges, where geometry that it meets there would hide
-    /// a light by rounding alone; and its weights.
+    /// The place of the triangle nearest to `place`, but not at its edges, where geometry that it meets there may hide
+    /// a light; and its weights.
     pub fn inside(&self, place: DVec2) -> (DVec2, [f64; 2]) {
         let (nearest, weights) = self.nearest(place);
         let [a, b, c] = self.corners;

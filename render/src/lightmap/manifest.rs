@@ -7,10 +7,13 @@ use super::atlas::{Atlas, Rectangle};
 use super::target::{Quantity, Target};
 use luxel_scenes::{Scene, UnitSystem};
 use luxel_solver::solvers::Ledger;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+
+/// Version of the schema that is written and read.
+pub const SCHEMA: u32 = 1;
 
 /// The folder's content.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Manifest {
     /// Version of this schema.
     pub schema: u32,
@@ -22,10 +25,10 @@ pub struct Manifest {
     pub units: Units,
     /// Factor from what is seen, L = ρE/π, to display values of 0 to 1, as in the preview.
     pub exposure: f64,
-    /// The maps of the first layer.
-    pub pages: Vec<Page>,
-    /// All sets of maps.
-    pub layers: Vec<Layer>,
+    /// The maps that the delivered scene names.
+    pub lightmap: Layer,
+    /// Further sets of maps, with the same coordinates.
+    pub others: Vec<Layer>,
     /// How the scene is sampled.
     pub atlas: Sampling,
     /// Every object with the place that it has.
@@ -39,7 +42,7 @@ pub struct Manifest {
 }
 
 /// A set of maps, a page each.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Layer {
     /// What they hold: `all`, `direct` or `indirect` light, or `ao`.
     pub include: String,
@@ -54,22 +57,22 @@ pub struct Layer {
 }
 
 /// What a texel holds.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Units {
     /// `irradiance` E, or `white-radiance` E/π.
     pub quantity: Quantity,
     /// Unit of E: `W/m2` or `lx`.
-    pub unit: &'static str,
+    pub unit: String,
     /// Factor from E to the texel.
     pub factor: f64,
     /// Always linear.
-    pub colour_space: &'static str,
+    pub colour_space: String,
     /// Whom the maps are for.
     pub target: Target,
 }
 
 /// A map.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Page {
     /// What the engine loads.
     pub file: String,
@@ -78,6 +81,10 @@ pub struct Page {
     /// What was gathered (E), before anything was filled or filtered, black where nothing was, with its standard error in
     /// the layer `error`.
     pub luxels: String,
+    /// A grey picture of its texels: 255 where light was gathered, 128 inside solids, 0 where no surface is.
+    pub validity: String,
+    /// A picture of its charts.
+    pub charts: String,
     /// Width in texels.
     pub width: usize,
     /// Height in texels.
@@ -85,7 +92,7 @@ pub struct Page {
 }
 
 /// How the scene is sampled.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Sampling {
     /// Width of a page in texels.
     pub width: usize,
@@ -106,7 +113,7 @@ pub struct Sampling {
 }
 
 /// An object's place.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Placed {
     /// Its name in the scene.
     pub name: String,
@@ -119,7 +126,7 @@ pub struct Placed {
 }
 
 /// Files beside the maps.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Files {
     /// The scene as binary glTF with the lightmap's coordinates in `TEXCOORD_1`.
     pub glb: String,
@@ -127,19 +134,17 @@ pub struct Files {
     pub obj: String,
     /// The scene as it looks with the maps.
     pub preview: String,
-    /// The charts.
-    pub atlas: String,
 }
 
 /// Numbers that Bevy wants.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Bevy {
     /// `StandardMaterial::lightmap_exposure`.
     pub lightmap_exposure: f64,
 }
 
 /// Relative errors.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Error {
     /// Of the light at luxels: what `--error` asks for.
     pub luxels: f64,
@@ -150,7 +155,7 @@ pub struct Error {
 }
 
 /// Where the flux goes.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Energy {
     /// Sent out by surfaces and lights, as far as it arrives.
     pub emitted: [f64; 3],

@@ -17,6 +17,17 @@ pub enum Texel {
     Lit,
 }
 
+impl Texel {
+    /// The sample that stands for it in pictures of validity.
+    pub fn sample(self) -> u8 {
+        match self {
+            Self::Empty => 0,
+            Self::Buried => 128,
+            Self::Lit => 255,
+        }
+    }
+}
+
 /// Values of all texels of an atlas, page by page and row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lightmap {
@@ -88,6 +99,13 @@ impl Lightmap {
     /// Memory of maps of so many texels, in bytes.
     pub fn bytes_for(texels: usize) -> usize {
         texels * (size_of::<Texel>() + 2 * size_of::<Rgb>())
+    }
+
+    /// What each texel of a page is, as samples of a grey picture.
+    pub fn validity(&self, page: usize) -> Vec<u8> {
+        let texels = self.page_texels();
+        let own = &self.texels[page * texels..(page + 1) * texels];
+        own.iter().map(|texel| texel.sample()).collect()
     }
 
     /// One of the pages of some values.

@@ -7,7 +7,7 @@
 //! - On smooth surfaces light is received along the shading normal, from a point on the curved surface that the facets stand for
 //!   (J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021): a facet's own horizon would show otherwise.
 //!
-//! Cost: [`RAYS`] rays a luxel.
+//! Cost: 16 rays a luxel.
 
 use super::atlas::Atlas;
 use super::luxels::{Luxel, Placed, centre};

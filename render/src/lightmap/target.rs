@@ -3,7 +3,7 @@
 //! | consumer | its shader | so a texel holds |
 //! |---|---|---|
 //! | raw | | E |
-//! | three.js (since r152) | irradiance += texel · lightMapIntensity, × albedo / π | E |
+//! | three.js (since r155) | irradiance += texel · lightMapIntensity, × albedo / π | E |
 //! | Bevy | diffuse += texel · lightmap_exposure · albedo, × exposure of the view | E/π |
 //! | Godot 4 | ambient += texel, × albedo | E/π |
 //! | Blender | emission of texel · albedo | E/π |
@@ -15,7 +15,9 @@
 use std::f64::consts::FRAC_1_PI;
 
 /// A consumer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Serialize, serde::Deserialize,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum Target {
     /// Irradiance E as it is
@@ -33,7 +35,7 @@ pub enum Target {
 }
 
 /// What a texel holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quantity {
     /// Irradiance E.

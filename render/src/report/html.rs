@@ -52,7 +52,7 @@ pub(super) fn table(columns: &[Column], rows: impl IntoIterator<Item = Vec<Strin
 }
 
 /// All parts in a row.
-pub(super) fn concat(parts: impl IntoIterator<Item = String>) -> String {
+pub(crate) fn concat(parts: impl IntoIterator<Item = String>) -> String {
     parts.into_iter().fold(String::new(), |mut text, part| {
         text.push_str(&part);
         text
@@ -61,7 +61,7 @@ pub(super) fn concat(parts: impl IntoIterator<Item = String>) -> String {
 
 /// `text` as HTML: whatever a scene file calls its things, it cannot leave the text or an attribute in
 /// double quotes.
-pub(super) fn escape(text: impl Display) -> String {
+pub(crate) fn escape(text: impl Display) -> String {
     let text = text.to_string();
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
@@ -82,7 +82,7 @@ pub(super) fn escape(text: impl Display) -> String {
 }
 
 /// `bytes` in base 64 (RFC 4648, section 4).
-pub(super) fn base64(bytes: &[u8]) -> String {
+pub(crate) fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for group in bytes.chunks(3) {

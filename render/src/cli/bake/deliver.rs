@@ -60,15 +60,19 @@ impl Delivery<'_> {
                 patches: layer.patches,
             });
         }
-        let first = &layers[0].maps.map;
-        for page in 0..atlas.pages {
-            let samples = picture::page(atlas, &self.baked.luxels.triangles, first, page);
-            let name = format!("atlas_{page:03}.png");
-            let name = if page == 0 { "atlas.png" } else { &name };
+        let mut described = described.into_iter();
+        let Some(lightmap) = described.next() else {
+            unreachable!("something is included");
+        };
+        let raw = &layers[0].maps.raw;
+        for (index, page) in lightmap.pages.iter().enumerate() {
+            let samples = picture::page(atlas, &self.baked.luxels.triangles, raw, index);
             self.folder
-                .write(name, &png::encode_rgb8(&samples, atlas.size)?)?;
+                .write(&page.charts, &png::encode_rgb8(&samples, atlas.size)?)?;
+            let validity = png::encode_grey8(&raw.validity(index), atlas.size)?;
+            self.folder.write(&page.validity, &validity)?;
         }
-        let files = described[0].pages.iter().map(|page| page.file.clone());
+        let files = lightmap.pages.iter().map(|page| page.file.clone());
         let files: Vec<String> = files.collect();
         self.folder
             .write("scene.glb", &glb(scene, self.origin, atlas, &files)?)?;
@@ -79,7 +83,7 @@ impl Delivery<'_> {
         let tone_map = ToneMap::automatic(&preview);
         self.folder
             .write("preview.png", &png::encode(&preview, tone_map)?)?;
-        let manifest = self.manifest(described, f64::from(tone_map.exposure));
+        let manifest = self.manifest(lightmap, described.collect(), f64::from(tone_map.exposure));
         if let Some((name, text)) = self.target.snippet() {
             let exposure = manifest.bevy.map_or(1.0, |bevy| bevy.lightmap_exposure);
             let text = text.replace("{lightmap_exposure}", &format!("{exposure:?}"));
@@ -96,6 +100,8 @@ impl Delivery<'_> {
             file: format!("{stem}_{page:03}.exr"),
             error: format!("{stem}_{page:03}_error.exr"),
             luxels: format!("{stem}_{page:03}_luxels.exr"),
+            validity: format!("atlas_{page:03}_validity.png"),
+            charts: format!("atlas_{page:03}.png"),
             width: self.baked.atlas.size[0],
             height: self.baked.atlas.size[1],
         }
@@ -152,28 +158,33 @@ impl Delivery<'_> {
         Ok(expose(&view, &frame, samples, &Silent).mean())
     }
 
-    fn manifest(&self, layers: Vec<manifest::Layer>, exposure: f64) -> Manifest {
+    fn manifest(
+        &self,
+        lightmap: manifest::Layer,
+        others: Vec<manifest::Layer>,
+        exposure: f64,
+    ) -> Manifest {
         let Baked { atlas, .. } = self.baked;
         let map = &self.baked.layers[0].maps.map;
         let scene = self.world.scene();
         let quantity = self.target.quantity();
         Manifest {
-            schema: 1,
+            schema: manifest::SCHEMA,
             software: concat!("luxel ", env!("CARGO_PKG_VERSION")).into(),
             scene: scene.name.clone(),
             units: Units {
                 quantity,
                 unit: match scene.units {
-                    UnitSystem::Radiometric => "W/m2",
-                    UnitSystem::Photometric => "lx",
+                    UnitSystem::Radiometric => "W/m2".into(),
+                    UnitSystem::Photometric => "lx".into(),
                 },
                 factor: quantity.factor(),
-                colour_space: "linear Rec. 709",
+                colour_space: "linear Rec. 709".into(),
                 target: self.target,
             },
             exposure,
-            pages: layers[0].pages.clone(),
-            layers,
+            lightmap,
+            others,
             atlas: Sampling {
                 width: atlas.size[0],
                 height: atlas.size[1],
@@ -193,7 +204,6 @@ impl Delivery<'_> {
                 glb: "scene.glb".into(),
                 obj: "scene.obj".into(),
                 preview: "preview.png".into(),
-                atlas: "atlas.png".into(),
             },
             bevy: (self.target == Target::Bevy).then(|| Bevy::new(scene.units, exposure)),
             seed: self.seed,

@@ -12,7 +12,7 @@ import bpy
 folder = pathlib.Path(sys.argv[sys.argv.index("--") + 1])
 manifest = json.loads((folder / "manifest.json").read_text())
 bpy.ops.import_scene.gltf(filepath=str(folder / "scene.glb"))
-pages = [bpy.data.images.load(str(folder / page["file"])) for page in manifest["pages"]]
+pages = [bpy.data.images.load(str(folder / page["file"])) for page in manifest["lightmap"]["pages"]]
 for image in pages:
     image.colorspace_settings.name = "Linear Rec.709"
 
