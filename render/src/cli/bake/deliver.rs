@@ -20,9 +20,11 @@ use crate::tone_map::ToneMap;
 use glam::DVec3;
 use luxel_scenes::{Camera, FieldOfView, GltfOrigin, Projection, Rgb, Scene, UnitSystem};
 use luxel_solver::world::World;
+use rayon::prelude::*;
 
-/// Samples of a pixel of the preview, and its longer side where the scene has no camera that says.
+/// Samples of a pixel of the preview, its longer side, and its size where the scene has no camera.
 const PREVIEW_SAMPLES: u32 = 16;
+const PREVIEW_SIDE: usize = 768;
 const PREVIEW_SIZE: [usize; 2] = [768, 576];
 
 /// What is delivered, to whom.
@@ -117,27 +119,29 @@ impl Delivery<'_> {
         let scaled =
             |values: &[Rgb]| -> Vec<Rgb> { values.iter().map(|value| *value * factor).collect() };
         let (values, errors) = (scaled(&map.values), scaled(&map.errors));
-        for (index, page) in pages.iter().enumerate() {
-            self.picture(&page.file, map.page(index, &values), Vec::new())?;
-            self.picture(&page.error, map.page(index, &errors), Vec::new())?;
-            let error = ("error".to_owned(), raw.page(index, &raw.errors));
-            self.picture(&page.luxels, raw.page(index, &raw.values), vec![error])?;
-        }
-        Ok(())
-    }
-
-    fn picture(
-        &self,
-        name: &str,
-        image: Image,
-        layers: Vec<(String, Image)>,
-    ) -> Result<(), Failure> {
-        let picture = Picture {
-            image,
-            layers,
-            origin: None,
-        };
-        Ok(self.folder.write(name, &exr::encode(&picture)?)?)
+        let pictures: Vec<(&str, Picture)> = pages
+            .iter()
+            .enumerate()
+            .flat_map(|(index, page)| {
+                let luxels = raw.page(index, &raw.values);
+                let error = ("error".to_owned(), raw.page(index, &raw.errors));
+                [
+                    (
+                        page.file.as_str(),
+                        picture_of(map.page(index, &values), vec![]),
+                    ),
+                    (
+                        page.error.as_str(),
+                        picture_of(map.page(index, &errors), vec![]),
+                    ),
+                    (page.luxels.as_str(), picture_of(luxels, vec![error])),
+                ]
+            })
+            .collect();
+        pictures.par_iter().try_for_each(|(name, picture)| {
+            self.folder.write(name, &exr::encode(picture)?)?;
+            Ok(())
+        })
     }
 
     /// The scene with its maps, from its first camera or one that sees most of it.
@@ -148,7 +152,9 @@ impl Delivery<'_> {
             .first()
             .cloned()
             .unwrap_or_else(|| overview(scene));
-        let frame = CameraFrame::new(&camera, camera.size)?;
+        let side = camera.size[0].max(camera.size[1]);
+        let size = camera.size.map(|s| (s * PREVIEW_SIDE / side.max(1)).max(1));
+        let frame = CameraFrame::new(&camera, size)?;
         let view = LightmapView::new(
             self.world,
             &self.baked.atlas,
@@ -208,6 +214,15 @@ impl Delivery<'_> {
             bevy: (self.target == Target::Bevy).then(|| Bevy::new(scene.units, exposure)),
             seed: self.seed,
         }
+    }
+}
+
+/// A picture that needs no word on its origin: the manifest has it.
+fn picture_of(image: Image, layers: Vec<(String, Image)>) -> Picture {
+    Picture {
+        image,
+        layers,
+        origin: None,
     }
 }
 

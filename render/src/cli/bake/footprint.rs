@@ -50,7 +50,8 @@ impl Bake {
             )
             .with(
                 "maps",
-                2 * self.include.len() * Lightmap::bytes_for(texels) + Picture::bytes_for(page, 1),
+                2 * self.include.len() * Lightmap::bytes_for(texels)
+                    + 2 * Picture::bytes_for(page, 1),
             );
         let with_mesh = |error: f64| {
             let patches = self.first_patches(error);

@@ -103,6 +103,11 @@ impl Bake {
             direct_noise: Irradiance(error.total()),
             ..Gathered::default()
         };
+        if self.max_distance.is_none() && film.values().all(|value| value.max_element() <= 0.0) {
+            context.reporter.warning(
+                "nothing is open to the outside: without --max-distance ambient occlusion is black in a closed room",
+            );
+        }
         Some(AtLuxels {
             values: film.values().zip(&errors).map(value).collect(),
             stated: StatedError::of_samples(error.sampling, error.discretisation, 0.0),

@@ -13,15 +13,21 @@ const HOSTILE: &str = "</script><img src=x onerror=alert(1)>{{three}}\"'&<!--";
 
 fn manifest() -> Value {
     json!({
-        "schema": 1, "software": "luxel test", "scene": HOSTILE, "include": "all", "exposure": 0.5, "patches": 7, "seed": 0,
+        "schema": 1, "software": "luxel test", "scene": HOSTILE, "exposure": 0.5, "seed": 0,
         "units": {"quantity": "irradiance", "unit": "W/m2", "factor": 1.0, "colour_space": "linear Rec. 709", "target": "three"},
-        "pages": [{"file": "light.exr", "error": "error.exr", "luxels": "luxels.exr", "validity": "validity.png",
-                   "charts": "charts.png", "width": 2, "height": 1}],
-        "atlas": {"texels_per_metre": 4.0, "utilisation": 0.5, "charts": 1, "padding": 1, "lit": 1, "buried": 1},
+        "lightmap": {
+            "include": "all", "patches": 7, "energy": null,
+            "error": {"luxels": 0.01, "filtering": 0.002, "total": 0.0102},
+            "pages": [{"file": "light.exr", "error": "error.exr", "luxels": "luxels.exr", "validity": "validity.png",
+                       "charts": "charts.png", "width": 2, "height": 1}],
+        },
+        "others": [],
+        "atlas": {"width": 2, "height": 1, "texels_per_metre": 4.0, "utilisation": 0.5, "charts": 1, "padding": 1, "lit": 1,
+                  "buried": 1},
         "objects": [{"name": HOSTILE, "area": 1.0, "texels_per_metre": 4.0,
                      "rectangles": [{"page": 0, "min": [0, 0], "max": [2, 1]}]}],
-        "files": {"glb": "scene.glb", "obj": "scene.obj", "preview": "preview.png", "atlas": "charts.png"},
-        "bevy": null, "error": {"luxels": 0.01, "filtering": 0.002, "total": 0.0102}, "energy": null,
+        "files": {"glb": "scene.glb", "obj": "scene.obj", "preview": "preview.png"},
+        "bevy": null,
     })
 }
 
@@ -158,9 +164,9 @@ fn other_manifests_are_refused() {
     };
     assert!(told(&|m| m["schema"] = json!(2)).contains("schema 2"));
     assert!(told(&|m| m["schema"] = json!("new")).contains("not a manifest"));
-    assert!(told(&|m| m["pages"] = json!([{}])).contains("not a manifest"));
+    assert!(told(&|m| m["lightmap"]["pages"] = json!([{}])).contains("not a manifest"));
     assert!(
-        told(&|m| m["pages"][0]["width"] = json!(3))
+        told(&|m| m["lightmap"]["pages"][0]["width"] = json!(3))
             .contains("2 × 1 texels where manifest.json says 3 × 1")
     );
     for name in ["../light.exr", "/etc/passwd", "a/light.exr", "..", "."] {
