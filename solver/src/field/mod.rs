@@ -11,7 +11,7 @@
 //! is left. The bias of the polynomials shows in their residuals, which exceed the noise by its square;
 //! [`Cells::widening`] is the factor by which it and the noise together exceed the noise.
 //!
-//! Receivers that a wall stands between are not joined, where it is asked for ([`regions`]).
+//! Receivers that a wall stands between are not joined, where it is asked for (`regions`).
 //! Receivers that share a plane with fewer than [`FEWEST`] others stay as they are. Valid for values that
 //! are independent between receivers. Cost: about 4 µs a receiver with a few dozen columns, and 8 bytes a
 //! coefficient and column.
