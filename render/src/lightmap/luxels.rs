@@ -38,9 +38,12 @@ impl Luxel {
 /// Width in texels of a strip of a texel that is too narrow to give it light: rounding makes such.
 const MARGIN: f64 = 0.01;
 
-/// How far from an edge, in texels, points are that would lie on it. Nearer, and the last millimetres below a ceiling would speak for
-/// a whole texel.
-const INSET: f64 = 0.25;
+/// How far from an edge, in texels, points are that would lie on it. At 0.25 small charts lose the ends of what they show (a furnished
+/// office: 6.8 % instead of 4.9).
+const INSET: f64 = 0.05;
+
+/// How far from an edge, in texels, a place may be and still lie on it: coordinates are rounded to f32.
+const ROUNDING: f64 = 1e-3;
 
 /// A triangle of a chart in texels of its page.
 #[derive(Clone, Copy, Debug)]
@@ -106,20 +109,39 @@ impl Placed {
         [0, 1].map(|axis| low[axis] as usize..(high[axis] as usize).min(size[axis]))
     }
 
+    /// Distances of a place from the three edges, inwards, in texels.
+    fn from_edges(&self, place: DVec2) -> [f64; 3] {
+        let [a, b, c] = self.corners;
+        let area = (b - a).perp_dot(c - a).abs();
+        let [u, v] = self.weights(place);
+        let height = |opposite: DVec2| area / opposite.length();
+        [
+            (1.0 - u - v) * height(c - b),
+            u * height(a - c),
+            v * height(b - a),
+        ]
+    }
+
     /// The place of the triangle nearest to `place`, but not at its edges, where geometry that it meets there may hide
     /// a light; and its weights.
     pub fn inside(&self, place: DVec2) -> (DVec2, [f64; 2]) {
-        let (nearest, weights) = self.nearest(place);
+        let nearest = self.nearest(place).0;
         let [a, b, c] = self.corners;
-        let inwards = (a + b + c) / 3.0 - nearest;
-        let least = weights[0]
-            .min(weights[1])
-            .min(1.0 - weights[0] - weights[1]);
-        if least > 0.0 {
-            return (nearest, weights);
-        }
-        let share = (INSET / inwards.length()).min(0.5);
-        let place = nearest + inwards * share;
+        let middle = (a + b + c) / 3.0;
+        let edges = self
+            .from_edges(nearest)
+            .into_iter()
+            .zip(self.from_edges(middle));
+        // On the way to the middle the distances change in proportion.
+        let shares = edges.map(|(near, far)| {
+            let wanted = INSET.min(0.5 * far);
+            if near < wanted {
+                (wanted - near) / (far - near)
+            } else {
+                0.0
+            }
+        });
+        let place = nearest.lerp(middle, shares.fold(0.0, f64::max));
         (place, self.weights(place))
     }
 
@@ -178,6 +200,8 @@ const SMALL_CHART: usize = 12;
 struct Found {
     /// The triangle nearest to the centre, and the square of its distance.
     nearest: (u32, f32),
+    /// Triangles at whose edge the centre lies, up to rounding.
+    at_edge: u8,
     /// The first triangle at each of the quarters.
     quarters: [u32; 4],
 }
@@ -188,6 +212,7 @@ const NONE: u32 = u32::MAX;
 pub fn luxels(atlas: &Atlas, triangles: &[Placed]) -> Vec<Luxel> {
     let nothing = Found {
         nearest: (NONE, f32::INFINITY),
+        at_edge: 0,
         quarters: [NONE; 4],
     };
     let mut found = vec![nothing; atlas.texels()];
@@ -203,6 +228,9 @@ pub fn luxels(atlas: &Atlas, triangles: &[Placed]) -> Vec<Luxel> {
                 let found = &mut found[atlas.texel(triangle.page, column, row)];
                 if distance < found.nearest.1 {
                     found.nearest = (index as u32, distance);
+                }
+                if distance <= 0.0 && triangle.from_edges(centre).iter().any(|&d| d < ROUNDING) {
+                    found.at_edge = found.at_edge.saturating_add(1);
                 }
                 for (quarter, offset) in found.quarters.iter_mut().zip(QUARTERS) {
                     if *quarter == NONE && triangle.contains(centre + offset) {
@@ -225,8 +253,7 @@ pub fn luxels(atlas: &Atlas, triangles: &[Placed]) -> Vec<Luxel> {
         }
         let centre = centre(atlas, texel);
         let first = &triangles[found.nearest.0 as usize];
-        let mut push = |triangle: &Placed, place: DVec2| {
-            let (place, [u, v]) = triangle.inside(place);
+        let mut push = |triangle: &Placed, (place, [u, v]): (DVec2, [f64; 2])| {
             luxels.push(Luxel {
                 texel: texel as u32,
                 chart: triangle.chart,
@@ -245,10 +272,13 @@ pub fn luxels(atlas: &Atlas, triangles: &[Placed]) -> Vec<Luxel> {
         });
         let mut inside = inside.peekable();
         let is_small = texels_of[&first.chart] <= SMALL_CHART;
-        if first.contains(centre) && !is_small || inside.peek().is_none() {
-            push(first, centre);
+        // The edge of one triangle alone is an edge of the chart.
+        if first.contains(centre) && !is_small && found.at_edge != 1 {
+            push(first, (centre, first.weights(centre)));
+        } else if inside.peek().is_none() {
+            push(first, first.inside(centre));
         } else {
-            inside.for_each(|(triangle, place)| push(triangle, place));
+            inside.for_each(|(triangle, place)| push(triangle, triangle.inside(place)));
         }
     }
     luxels
