@@ -278,8 +278,15 @@ fn bad_bakes_are_refused_with_a_reason() {
     );
     let dark = scene_files::write(&dark, folder.path(), "");
     let out = folder.path().join("out");
-    let cornell = example("cornell");
+    let [cornell, pavilion] = ["cornell", "pavilion"].map(example);
     for (scene, out, options, exit, words) in [
+        (
+            &pavilion,
+            &out,
+            vec!["--uv", "keep"],
+            ExitCode::InvalidInput,
+            "overlap",
+        ),
         (&cornell, &occupied, vec![], ExitCode::Failure, "occupied"),
         (
             &dark,

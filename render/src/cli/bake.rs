@@ -268,9 +268,9 @@ impl Bake {
         context: &Context<'_>,
     ) -> Result<Option<Baked>, Failure> {
         let atlas = self.places(world, context)?;
+        let held = self.require_memory(world, &atlas, goal, context)?;
         let luxels = Luxels::new(world, &atlas, self.backface_tolerance);
-        let count = luxels.lit.luxels.len();
-        if count == 0 {
+        if luxels.lit.luxels.is_empty() {
             return Err(Failure::new(
                 ExitCode::NothingToDo,
                 format!(
@@ -279,7 +279,6 @@ impl Bake {
                 ),
             ));
         }
-        let held = self.require_memory(world, &atlas, count, goal, context)?;
         let mut layers = Vec::new();
         for &include in &self.include {
             let gathered = match include.components() {

@@ -202,3 +202,88 @@ impl Noisy<'_> {
         of_channel(0) + of_channel(1) + of_channel(2)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lightmap::atlas::{Atlas, ChartId};
+    use glam::DVec2;
+    use luxel_scenes::Irradiance;
+    use luxel_solver::geometry::TriangleId;
+    use luxel_solver::sampling::{Stage, hash};
+    use luxel_solver::surface::SurfacePoint;
+
+    const SIDE: usize = 48;
+
+    /// A page of two charts, left and right, with noise of a known standard deviation on a truth.
+    fn noisy(
+        sigma: f64,
+        truth: impl Fn(usize, usize) -> f64,
+    ) -> (Lightmap, Vec<Luxel>, Vec<Gathered>) {
+        let atlas = Atlas {
+            size: [SIDE; 2],
+            pages: 1,
+            corners: Vec::new(),
+            face_chart: Vec::new(),
+            charts: Vec::new(),
+            padding: 1,
+        };
+        let luxel = |texel: usize| Luxel {
+            texel: texel as u32,
+            chart: ChartId(u32::from(texel % SIDE >= SIDE / 2)),
+            point: SurfacePoint {
+                triangle: TriangleId(0),
+                u: 0.0,
+                v: 0.0,
+            },
+            offset: DVec2::ZERO,
+        };
+        let gathered = |texel: usize| {
+            // The sum of twelve uniform numbers has a variance of one.
+            let uniform = |k| hash::uniform(1, Stage::LIGHTMAP, texel as u64, k);
+            let deviate = (0..12).map(uniform).sum::<f64>() - 6.0;
+            Gathered {
+                direct: Irradiance(Rgb::splat(
+                    truth(texel % SIDE, texel / SIDE) + sigma * deviate,
+                )),
+                direct_noise: Irradiance(Rgb::splat(sigma)),
+                ..Gathered::default()
+            }
+        };
+        let luxels: Vec<Luxel> = (0..SIDE * SIDE).map(luxel).collect();
+        let gathered: Vec<Gathered> = (0..SIDE * SIDE).map(gathered).collect();
+        let map = Lightmap::new(&atlas, &luxels, &[], &gathered);
+        (map, luxels, gathered)
+    }
+
+    fn rms(map: &Lightmap, truth: impl Fn(usize, usize) -> f64) -> f64 {
+        let squares = map.values.iter().enumerate();
+        let squares = squares.map(|(t, v)| (v.x - truth(t % SIDE, t / SIDE)).powi(2));
+        (squares.sum::<f64>() / map.values.len() as f64).sqrt()
+    }
+
+    /// Of flat light a third of the noise is left at most; an edge of ten standard deviations costs less than that gains; charts do not
+    /// mix: the step between them has no noise to hide in.
+    #[test]
+    fn noise_goes_and_edges_stay() {
+        let flat = |_: usize, _: usize| 1.0;
+        let edge = |_: usize, row: usize| if row < SIDE / 3 { 1.0 } else { 2.0 };
+        let charts = |column: usize, _: usize| if column < SIDE / 2 { 1.0 } else { 1.01 };
+        let smoothed = |truth: &dyn Fn(usize, usize) -> f64, sigma: f64| {
+            let (mut map, luxels, gathered) = noisy(sigma, truth);
+            denoise(&mut map, &luxels, &gathered);
+            rms(&map, truth) / sigma
+        };
+        assert!(smoothed(&flat, 0.1) < 0.33, "{}", smoothed(&flat, 0.1));
+        assert!(smoothed(&edge, 0.1) < 0.5, "{}", smoothed(&edge, 0.1));
+        assert!(smoothed(&charts, 0.1) < 0.33, "{}", smoothed(&charts, 0.1));
+    }
+
+    #[test]
+    fn light_without_noise_is_not_touched() {
+        let (mut map, luxels, gathered) = noisy(0.0, |column, row| (column * row) as f64);
+        let before = map.clone();
+        denoise(&mut map, &luxels, &gathered);
+        assert!(map == before);
+    }
+}

@@ -109,8 +109,8 @@ impl Placed {
         [0, 1].map(|axis| low[axis] as usize..(high[axis] as usize).min(size[axis]))
     }
 
-    /// Distances of a place from the three edges, inwards, in texels.
-    fn from_edges(&self, place: DVec2) -> [f64; 3] {
+    /// Distances of a place to the three edges, inwards, in texels.
+    fn distances_to_edges(&self, place: DVec2) -> [f64; 3] {
         let [a, b, c] = self.corners;
         let area = (b - a).perp_dot(c - a).abs();
         let [u, v] = self.weights(place);
@@ -129,9 +129,9 @@ impl Placed {
         let [a, b, c] = self.corners;
         let middle = (a + b + c) / 3.0;
         let edges = self
-            .from_edges(nearest)
+            .distances_to_edges(nearest)
             .into_iter()
-            .zip(self.from_edges(middle));
+            .zip(self.distances_to_edges(middle));
         // On the way to the middle the distances change in proportion.
         let shares = edges.map(|(near, far)| {
             let wanted = INSET.min(0.5 * far);
@@ -208,6 +208,11 @@ struct Found {
 
 const NONE: u32 = u32::MAX;
 
+/// Memory that is needed to find the luxels of so many texels, in bytes.
+pub fn bytes_to_find(texels: usize) -> usize {
+    texels * size_of::<Found>()
+}
+
 /// The luxels of an atlas, in the order of their texels.
 pub fn luxels(atlas: &Atlas, triangles: &[Placed]) -> Vec<Luxel> {
     let nothing = Found {
@@ -229,7 +234,12 @@ pub fn luxels(atlas: &Atlas, triangles: &[Placed]) -> Vec<Luxel> {
                 if distance < found.nearest.1 {
                     found.nearest = (index as u32, distance);
                 }
-                if distance <= 0.0 && triangle.from_edges(centre).iter().any(|&d| d < ROUNDING) {
+                if distance <= 0.0
+                    && triangle
+                        .distances_to_edges(centre)
+                        .iter()
+                        .any(|&d| d < ROUNDING)
+                {
                     found.at_edge = found.at_edge.saturating_add(1);
                 }
                 for (quarter, offset) in found.quarters.iter_mut().zip(QUARTERS) {
@@ -292,4 +302,82 @@ pub fn centre(atlas: &Atlas, texel: usize) -> DVec2 {
         (in_page % width) as f64 + 0.5,
         (in_page / width) as f64 + 0.5,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle(corners: [[f64; 2]; 3]) -> Placed {
+        Placed {
+            id: TriangleId(0),
+            chart: ChartId(0),
+            page: 0,
+            corners: corners.map(DVec2::from_array),
+        }
+    }
+
+    fn page(triangles: &[Placed]) -> Vec<Luxel> {
+        let atlas = Atlas {
+            size: [16, 16],
+            pages: 1,
+            corners: Vec::new(),
+            face_chart: Vec::new(),
+            charts: Vec::new(),
+            padding: 1,
+        };
+        luxels(&atlas, triangles)
+    }
+
+    /// Every point of a triangle is filtered from texels that have luxels or touch such; every luxel's point is on the triangle.
+    #[test]
+    fn luxels_cover_triangles_and_lie_on_them() {
+        for corners in [
+            [[1.0, 1.0], [14.0, 2.0], [3.0, 13.0]],
+            // Mirrored.
+            [[1.0, 1.0], [3.0, 13.0], [14.0, 2.0]],
+            // Thinner than a texel, and smaller.
+            [[2.1, 3.2], [13.0, 3.4], [2.1, 3.3]],
+            [[5.2, 5.2], [5.6, 5.3], [5.3, 5.7]],
+        ] {
+            let placed = triangle(corners);
+            let found = page(&[placed]);
+            for luxel in &found {
+                let SurfacePoint { u, v, .. } = luxel.point;
+                assert!(u.min(v).min(1.0 - u - v) > 0.0, "{corners:?}: {luxel:?}");
+                let texel = luxel.texel as usize;
+                let centre = DVec2::new((texel % 16) as f64 + 0.5, (texel / 16) as f64 + 0.5);
+                let [a, b, c] = placed.corners;
+                let place = a + (b - a) * u + (c - a) * v;
+                assert!((centre + luxel.offset).distance(place) < 1e-9);
+            }
+            for share in 0..100 {
+                let along = f64::from(share) / 99.0;
+                let [a, b, c] = placed.corners;
+                for place in [a.lerp(b, along), b.lerp(c, along), c.lerp(a, along)] {
+                    let inside = place.lerp((a + b + c) / 3.0, 0.1);
+                    let texel = inside.y.floor() as u32 * 16 + inside.x.floor() as u32;
+                    assert!(
+                        found.iter().any(|luxel| luxel.texel == texel),
+                        "{corners:?}: nothing at {inside}"
+                    );
+                }
+            }
+        }
+    }
+
+    /// Two triangles with a common edge through a texel's centre give it that centre once.
+    #[test]
+    fn centres_on_inner_edges_are_centres() {
+        let one = triangle([[0.5, 0.5], [12.5, 12.5], [0.5, 12.5]]);
+        let other = triangle([[0.5, 0.5], [12.5, 0.5], [12.5, 12.5]]);
+        let found = page(&[one, other]);
+        let at = |texel: u32| found.iter().filter(move |luxel| luxel.texel == texel);
+        for k in 2..10 {
+            let own: Vec<&Luxel> = at(k * 16 + k).collect();
+            assert!(own.len() == 1 && own[0].is_centred(), "{k}: {own:?}");
+        }
+        // On the chart's own edge they are moved off it.
+        assert!(at(5).all(|luxel| !luxel.is_centred()));
+    }
 }
