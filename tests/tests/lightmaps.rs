@@ -60,7 +60,9 @@ fn maps_are_as_near_as_asked() {
         let (errors, within) = against_reference(scene, &["--size", "512", "--error", asked]);
         println!("{scene}: {errors:?}, within {within}");
         assert!(errors.nrmse <= nrmse, "{scene}: {errors:?}");
-        assert!(errors.bias.abs() <= 0.005, "{scene}: {errors:?}");
+        // A thousand points of errors of their own know the mean to nRMSE / √1000.
+        let known = 2.0 * errors.nrmse / 1000_f64.sqrt();
+        assert!(errors.bias.abs() <= 0.005 + known, "{scene}: {errors:?}");
         // Of normal errors 95 % lie within; those of filtering are not, and small charts have no neighbours to tell them by.
         assert!(within >= 0.85, "{scene}: {within}");
     }
