@@ -41,17 +41,15 @@ impl Energy {
     /// only lights: what of it meets no surface has escaped. Of other lights, only what arrives is
     /// known to be theirs, so that it counts as emitted.
     pub(super) fn new(solutions: &[RadiositySolution], emitted: Option<Rgb>) -> Self {
-        let mean = |value: fn(&Ledger) -> Rgb| {
-            let sum: Rgb = solutions.iter().map(|s| value(&s.ledger)).sum();
-            sum / solutions.len() as f64
-        };
-        let arrived = mean(|ledger| ledger.emitted.0 + ledger.direct.0);
+        let ledgers: Vec<Ledger> = solutions.iter().map(|solution| solution.ledger).collect();
+        let ledger = Ledger::mean(&ledgers);
+        let arrived = ledger.emitted.0 + ledger.direct.0;
         let emitted = emitted.unwrap_or(arrived);
         Self {
             emitted,
-            absorbed: mean(|ledger| ledger.absorbed.0),
-            escaped: mean(|ledger| ledger.escaped.0) + (emitted - arrived),
-            residual: mean(|ledger| ledger.residual.0 + ledger.defect.0),
+            absorbed: ledger.absorbed.0,
+            escaped: ledger.escaped.0 + (emitted - arrived),
+            residual: ledger.residual.0 + ledger.defect.0,
         }
     }
 }
