@@ -268,8 +268,12 @@ impl Bake {
         context: &Context<'_>,
     ) -> Result<Option<Baked>, Failure> {
         let atlas = self.places(world, context)?;
-        let held = self.require_memory(world, &atlas, goal, context)?;
+        // At least the texels that faces cover: what does not fit then is refused before luxels are looked for.
+        let covered: f64 = atlas.object_texels(world.scene()).iter().sum();
+        self.require_memory(world, &atlas, covered as usize, goal, context)?;
         let luxels = Luxels::new(world, &atlas, self.backface_tolerance);
+        let count = luxels.lit.luxels.len();
+        let held = self.require_memory(world, &atlas, count, goal, context)?;
         if luxels.lit.luxels.is_empty() {
             return Err(Failure::new(
                 ExitCode::NothingToDo,

@@ -14,10 +14,6 @@ use luxel_solver::adaptive;
 use luxel_solver::gather::{Components, Gathered};
 use luxel_solver::world::{Receiver, World};
 
-/// Luxels to a texel of the area that faces cover: those at the edges of charts are more than their area, and may have several
-/// points. 1.02 to 1.05 where charts are large; 1.16 in a furnished office with 5000 charts on 512².
-const AT_EDGES: f64 = 1.25;
-
 impl Bake {
     /// Patches of the mesh that is begun with.
     pub(super) fn first_patches(&self, error: f64) -> usize {
@@ -34,17 +30,17 @@ impl Bake {
         }
     }
 
-    /// Refuses what would not fit into memory and says what would. Returns what else is held when patches are solved.
+    /// Refuses what would not fit into memory with so many luxels, and says what would. Returns what else is held when patches
+    /// are solved.
     pub(super) fn require_memory(
         &self,
         world: &World<'_>,
         atlas: &Atlas,
+        luxels: usize,
         goal: &Goal,
         context: &Context<'_>,
     ) -> Result<Footprint, Failure> {
         let texels = atlas.texels();
-        let covered: f64 = atlas.object_texels(world.scene()).iter().sum();
-        let luxels = (AT_EDGES * covered) as usize;
         let page = atlas.size[0] * atlas.size[1];
         let found = luxels * (size_of::<Luxel>() + size_of::<Receiver>() + size_of::<Gathered>());
         let held = Footprint::of(world)
