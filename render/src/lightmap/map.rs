@@ -11,7 +11,8 @@ use luxel_solver::gather::Gathered;
 pub enum Texel {
     /// No face is there; its value is that of the nearest chart.
     Empty,
-    /// A face is there, but its points lie under other geometry; its value is that of its neighbours.
+    /// A face is there, but its points lie under other geometry: its value is that of its neighbours as far as filtering reads
+    /// it, and zero beyond.
     Buried,
     /// Light was gathered for it.
     Lit,

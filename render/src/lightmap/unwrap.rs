@@ -9,7 +9,6 @@ use super::atlas::{Atlas, Chart, ChartId};
 use glam::{DVec2, Vec3};
 use luxel_scenes::{ObjectId, Scene};
 use std::collections::HashMap;
-use std::sync::Mutex;
 
 /// How finely surfaces are sampled, and how large pages are.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -148,12 +147,8 @@ impl Unwrapper for UvUnwrap {
             block_align: config.block_align,
             ..uvunwrap::Options::default()
         };
-        // The crate calls from many threads, one at a time.
-        let hears = Mutex::new(progress);
-        let packed = uvunwrap::generate_with_progress(&inputs, &options, |at| {
-            hears.lock().is_ok_and(|hears| hears(at.done, at.total))
-        })
-        .map_err(refusal)?;
+        let hear = |at: uvunwrap::Progress| progress(at.done, at.total);
+        let packed = uvunwrap::generate_with_progress(&inputs, &options, hear).map_err(refusal)?;
         Ok(atlas(scene, config, &meshes, &used, &packed))
     }
 }

@@ -8,7 +8,6 @@ use super::map::Lightmap;
 use crate::camera::CameraRay;
 use crate::integrators::{Integrator, SampleKey, Seen, Vertex, background, cast};
 use luxel_scenes::{Irradiance, Rgb};
-use luxel_solver::patches::Side;
 use luxel_solver::world::World;
 
 /// The integrator.
@@ -24,12 +23,9 @@ impl<'a> LightmapView<'a> {
         Self { world, atlas, map }
     }
 
-    /// Irradiance in the map at a vertex; none on backs and where no map is.
+    /// Irradiance in the map at a vertex, zero where no map is. A map has one side: both sides of a face show it.
     fn irradiance(&self, vertex: &Vertex<'_>) -> Rgb {
         let interaction = &vertex.interaction;
-        if interaction.side == Side::Back && vertex.reflectance().0.max_element() <= 0.0 {
-            return Rgb::ZERO;
-        }
         let surfaces = self.world.surfaces();
         let (scene, geometry) = (surfaces.scene(), surfaces.geometry());
         lookup::place(self.atlas, scene, geometry, interaction.point)
