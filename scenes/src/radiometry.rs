@@ -23,7 +23,7 @@ pub type Rgb = DVec3;
 macro_rules! quantity {
     ($(#[$doc:meta])* $name:ident) => {
         $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Default)]
+        #[derive(Clone, Copy, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
         pub struct $name(pub Rgb);
 
         impl $name {

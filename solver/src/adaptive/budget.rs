@@ -14,9 +14,10 @@
 
 use super::penumbrae::Penumbrae;
 use crate::gather::{ErrorParts, MAX_REPLICATES, SHADOW_EXPONENT};
+use serde::{Deserialize, Serialize};
 
 /// What is spent. Rays are over all replicates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Budget {
     /// Patches of the mesh that is looked up.
     pub patches: usize,

@@ -4,7 +4,7 @@
 //! are added until it suits. The noise of n rays at each receiver falls as n^−0.4 where there are many, because cells
 //! shrink as it does, and as n^−1 where the first few show a shape. Gather rays are kept; their sequences go on.
 
-use super::gathering::{add, all, parts};
+use super::gathering::{add, parts};
 use super::{Control, Stage};
 use crate::gather::{
     Components, GatherConfig, IndirectField, Lookup, MAX_REPLICATES, SkyRays, Solutions, Tally,
@@ -111,14 +111,6 @@ impl<'a> FieldGather<'a> {
         self.rays += rays;
         let (world, lookup) = (self.world, Some(self.lookup));
         let (receivers, tallies) = (self.receivers, &mut self.tallies);
-        add(
-            world,
-            lookup,
-            receivers,
-            &all(count),
-            &config,
-            tallies,
-            control,
-        )
+        add(world, lookup, receivers, &config, tallies, control)
     }
 }

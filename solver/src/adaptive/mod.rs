@@ -16,10 +16,12 @@
 //! measured: each then needs few rays.
 //!
 //! Every decision follows from sampled values, never from a clock, so that the result is the same at
-//! any thread count; a [`Control`] that measures time may end the work earlier.
+//! any thread count; a [`Control`] that measures time may end the work earlier. While receivers are gathered the control
+//! is shown a [`Checkpoint`] again and again, from which [`resume`] goes on to the same bits.
 
 mod adapted;
 mod budget;
+mod checkpoint;
 mod gathering;
 mod indirect_field;
 mod memory;
@@ -27,10 +29,11 @@ mod penumbrae;
 
 pub use adapted::Adapted;
 pub use budget::{Budget, ROW_RAYS, fewest_rays};
+pub use checkpoint::Checkpoint;
 pub use indirect_field::FieldGather;
 pub use memory::{bytes_to_gather, bytes_to_refine, bytes_to_solve, first_patches};
 
-use crate::gather::{Components, ErrorParts, Tally};
+use crate::gather::{Components, ErrorParts, Lookup, Tally};
 use crate::pilot::PilotError;
 use crate::solvers::Ledger;
 use crate::world::{Receiver, World};
@@ -87,6 +90,10 @@ pub trait Control {
 
     /// All receivers have been gathered, with these errors. True when they suit.
     fn suits(&mut self, parts: &ErrorParts) -> bool;
+
+    /// Another part of the receivers has been gathered: this is all that [`resume`] needs. Called after
+    /// [`Control::advance`], also when that ended the work.
+    fn keep(&mut self, _checkpoint: Checkpoint<'_>) {}
 }
 
 /// What work is on.
@@ -156,11 +163,10 @@ pub fn irradiance(
     config: &AdaptiveConfig,
     control: &mut dyn Control,
 ) -> Result<Adaptive, PilotError> {
-    let mut error = config.error / SAFETY;
+    let error = config.error / SAFETY;
     let mut budget = first_budget(world, error, receivers.len());
-    let mut gathering = Gathering::new(world, receivers, gathers(receivers.len()), config);
-    let mut adapted = None;
     let mut lookup = None;
+    let mut adapted = None;
     if config.components != Components::Direct {
         let scene = adapted.insert(Adapted::new(world, config.seed)?);
         match scene.prepare(receivers, receivers.len(), config, control)? {
@@ -168,41 +174,82 @@ pub fn irradiance(
                 let (share, fewest) = if receivers.len() >= JOINED_FROM {
                     (FIRST_SHARE_JOINED, least_rays(receivers.len()))
                 } else {
-                    let fewest = first_budget(world, error, receivers.len()).rays;
-                    (FIRST_SHARE, fewest)
+                    (FIRST_SHARE, budget.rays)
                 };
                 let first = even(share * planned.rays as f64).max(fewest);
-                let rays = first.min(planned.rays);
                 lookup = Some(solved);
                 budget.patches = planned.patches;
-                budget.rays = rays;
+                budget.rays = first.min(planned.rays);
             }
             None => return Ok(Adaptive::none()),
         }
     }
-    let mut result = Adaptive::none();
-    let mut shadow_rounds = gathering.evenly(budget.shadow_rays);
-    let mut is_held_back = false;
-    for _ in 0..MAX_ROUNDS {
-        let (stage, rays) = (Stage::Gathering, budget.rays);
-        gathering.spent.patches = budget.patches;
-        if !gathering.go_on(lookup.as_ref(), rays, shadow_rounds, stage, control) {
-            return Ok(result);
+    let mut gathering = Gathering::new(world, receivers, gathers(receivers.len()), config);
+    gathering.spent.patches = budget.patches;
+    let evenly = gathering.evenly(budget.shadow_rays);
+    let stage = Stage::Gathering;
+    if !gathering.go_on(lookup.as_ref(), budget.rays, evenly, stage, control) {
+        return Ok(Adaptive::none());
+    }
+    refine(gathering, adapted.as_ref(), lookup, config, control)
+}
+
+/// Goes on from a checkpoint of [`irradiance`] with the same world, receivers and configuration, to the same result.
+///
+/// # Errors
+/// As [`irradiance`].
+///
+/// # Panics
+/// When the checkpoint is not of so many receivers ([`Checkpoint::is_of`]).
+pub fn resume(
+    world: &World,
+    receivers: &[Receiver],
+    config: &AdaptiveConfig,
+    checkpoint: Checkpoint<'_>,
+    control: &mut dyn Control,
+) -> Result<Adaptive, PilotError> {
+    let mut gathering = Gathering::from_checkpoint(world, receivers, config, checkpoint);
+    let mut lookup = None;
+    let mut adapted = None;
+    if config.components != Components::Direct {
+        let scene = adapted.insert(Adapted::new(world, config.seed)?);
+        lookup = scene.solve(gathering.spent.patches, control)?;
+        if lookup.is_none() {
+            return Ok(Adaptive::none());
         }
-        // What the last round made is not needed any more: many receivers would be held three times.
-        drop(result);
-        result = gathering.state(lookup.as_ref());
+    }
+    if !gathering.go_on_after_checkpoint(lookup.as_ref(), control) {
+        return Ok(Adaptive::none());
+    }
+    refine(gathering, adapted.as_ref(), lookup, config, control)
+}
+
+/// Judges what was gathered, and gathers more until `control` is satisfied.
+fn refine(
+    mut gathering: Gathering<'_>,
+    adapted: Option<&Adapted<'_, '_>>,
+    mut lookup: Option<Lookup>,
+    config: &AdaptiveConfig,
+    control: &mut dyn Control,
+) -> Result<Adaptive, PilotError> {
+    loop {
+        let mut result = gathering.state(lookup.as_ref());
         if control.suits(&result.parts) {
             result.ending = Ending::Reached;
             return Ok(result);
         }
+        gathering.round.before += 1;
         let (total, upper) = (result.parts.total(), result.parts.upper());
-        error = config.error / MARGIN * (total / upper.max(f64::MIN_POSITIVE));
+        let error = config.error / MARGIN * (total / upper.max(f64::MIN_POSITIVE));
         // More is wanted than was planned for: half of what was reached.
-        error = if total <= error { 0.5 * total } else { error };
-        let (count, has_sky) = (receivers.len(), world.lights().has_sky());
+        let error = if total <= error { 0.5 * total } else { error };
+        let before = gathering.spent;
+        let (count, has_sky) = (
+            gathering.receivers.len(),
+            gathering.world.lights().has_sky(),
+        );
         let spent = Spent {
-            budget: gathering.spent,
+            budget: before,
             parts: result.parts,
             penumbrae: gathering.penumbrae(result.parts.direct, has_sky),
             has_sky,
@@ -211,44 +258,54 @@ pub fn irradiance(
         // A new mesh begins a new gather: only where rays cannot make up for the old one.
         let fixed = result.parts.solution.hypot(result.parts.mesh);
         let mut solved = None;
-        if let Some(scene) = adapted.as_ref().filter(|_| fixed > MESH_SHARE * error) {
+        if let Some(scene) = adapted.filter(|_| fixed > MESH_SHARE * error) {
             let free = spent.plan(error, count, Changes::All);
-            let worthwhile = (WORTHWHILE * budget.patches as f64) as usize;
-            let grows = free.budget.patches > budget.patches;
+            let worthwhile = (WORTHWHILE * before.patches as f64) as usize;
+            let grows = free.budget.patches > before.patches;
             if grows && worthwhile > config.most_patches {
-                is_held_back = true;
+                gathering.round.is_held_back = true;
                 // What the mesh leaves is too much by itself.
                 if fixed >= error {
                     result.ending = Ending::TooManyPatches;
                     return Ok(result);
                 }
             } else if grows {
-                let patches = free.budget.patches.max(worthwhile);
+                let patches = free.budget.patches.max(worthwhile).min(config.most_patches);
                 next = free;
-                next.budget.patches = patches.min(config.most_patches);
-                solved = scene.solve(next.budget.patches, control)?;
+                solved = scene
+                    .solve(patches, control)?
+                    .map(|lookup| (lookup, patches));
             }
         }
-        let before = gathering.spent.rays;
-        budget = Budget {
-            rays: next.budget.rays.clamp(before, RAY_GROWTH * before),
-            ..next.budget
-        };
-        shadow_rounds = spent.penumbrae.due(&next.shadow_rays);
-        if budget.rays == before && solved.is_none() && shadow_rounds.is_empty() {
-            break;
+        let rays = next
+            .budget
+            .rays
+            .clamp(before.rays, RAY_GROWTH * before.rays);
+        let shadow_rounds = spent.penumbrae.due(&next.shadow_rays);
+        let is_futile = rays == before.rays && solved.is_none() && shadow_rounds.is_empty();
+        if is_futile || gathering.round.before == MAX_ROUNDS {
+            result.ending = if gathering.round.is_held_back {
+                Ending::TooManyPatches
+            } else {
+                Ending::OutOfReach
+            };
+            return Ok(result);
         }
-        if solved.is_some() {
-            lookup = solved;
+        if let Some((finer, patches)) = solved {
+            lookup = Some(finer);
             gathering = gathering.with_direct_alone();
+            gathering.spent.patches = patches;
+        }
+        if !gathering.go_on(
+            lookup.as_ref(),
+            rays,
+            shadow_rounds,
+            Stage::Gathering,
+            control,
+        ) {
+            return Ok(result);
         }
     }
-    result.ending = if is_held_back {
-        Ending::TooManyPatches
-    } else {
-        Ending::OutOfReach
-    };
-    Ok(result)
 }
 
 /// Irradiance at receivers for a given budget, whatever its error; `config.error` does not matter.
@@ -345,5 +402,7 @@ impl Spent {
     }
 }
 
+#[cfg(test)]
+mod checkpoint_tests;
 #[cfg(test)]
 mod tests;

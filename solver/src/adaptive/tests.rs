@@ -86,7 +86,7 @@ fn it_may_be_stopped_anywhere_and_keeps_the_last_complete_state() {
 }
 
 /// Receivers on a grid on the floor of the Cornell box, some of them below the boxes' shadows, none below a box.
-fn on_the_floor(world: &World, side: usize) -> Vec<Receiver> {
+pub(super) fn on_the_floor(world: &World, side: usize) -> Vec<Receiver> {
     let at = |i: usize| (i as f64 + 0.5) / side as f64;
     let positions: Vec<_> = (0..side * side)
         .map(|i| glam::DVec3::new(0.02 + 0.51 * at(i % side), 0.0, 0.01 + 0.04 * at(i / side)))

@@ -18,13 +18,14 @@
 use super::lookup::{MAX_REPLICATES, PerSolution};
 use crate::error::{discretisation, moderate};
 use luxel_scenes::{Irradiance, Rgb};
+use serde::{Deserialize, Serialize};
 
 /// Exponent with which the noise of direct light falls with its shadow rays, measured on the reference scenes
 /// (0.6–0.75).
 pub(crate) const SHADOW_EXPONENT: f64 = 0.7;
 
 /// Sums over the rays of a receiver. Tallies of the same receiver from different rays can be joined.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
 pub struct Tally {
     /// Direct irradiance by gather: from shadow rays, a mean.
     pub(super) direct: [Rgb; MAX_REPLICATES],
@@ -57,7 +58,7 @@ pub struct Tally {
 }
 
 /// Irradiance at a receiver with its error.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
 pub struct Gathered {
     /// Direct irradiance in W/m².
     pub direct: Irradiance,
