@@ -6,9 +6,12 @@
 //! pipe) cannot be renamed onto and are written in place.
 
 use std::fs;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// What temporary names begin with.
+const TEMPORARY: &str = ".luxel-";
 
 /// Held while a file is written under its temporary name.
 static WRITING: Mutex<()> = Mutex::new(());
@@ -35,7 +38,7 @@ pub enum OutputError {
     IsFolder(PathBuf),
     /// The system refused.
     #[error("cannot write {}; check the folder's permissions and the free space, or choose another path", .0.display())]
-    Refused(PathBuf, #[source] std::io::Error),
+    Refused(PathBuf, #[source] io::Error),
 }
 
 /// A place where a file can be written.
@@ -81,17 +84,28 @@ impl Output {
     /// # Errors
     /// When the system refuses; an older file is then still there, unchanged.
     pub fn write(&self, bytes: &[u8]) -> Result<(), OutputError> {
+        self.write_with(|file| file.write_all(bytes))
+    }
+
+    /// Makes what `content` writes the content of the file, at once.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_with(
+        &self,
+        content: impl FnOnce(&mut fs::File) -> io::Result<()>,
+    ) -> Result<(), OutputError> {
         let refused = |error| OutputError::Refused(self.path.clone(), error);
         if self.special {
             return fs::OpenOptions::new()
                 .write(true)
                 .open(&self.target)
-                .and_then(|mut file| file.write_all(bytes))
+                .and_then(|mut file| content(&mut file))
                 .map_err(refused);
         }
         let _held = hold_writes();
         let mut temporary = self.temporary()?;
-        temporary.write_all(bytes).map_err(refused)?;
+        content(temporary.as_file_mut()).map_err(refused)?;
         temporary
             .persist(&self.target)
             .map_err(|error| refused(error.error))?;
@@ -111,7 +125,7 @@ impl Output {
             });
         }
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".luxel-");
+        builder.prefix(TEMPORARY);
         #[cfg(unix)]
         {
             // As any new file: readable by others, less what the user's mask forbids.
@@ -141,12 +155,45 @@ impl OutputFolder {
         Ok(folder)
     }
 
+    /// Removes temporary files that a process which was killed has left.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn remove_temporaries(&self) -> Result<(), OutputError> {
+        let refused = |error| OutputError::Refused(self.0.clone(), error);
+        let _held = hold_writes();
+        for entry in fs::read_dir(&self.0).map_err(refused)? {
+            let name = entry.map_err(refused)?.file_name();
+            if let Some(name) = name.to_str().filter(|name| name.starts_with(TEMPORARY)) {
+                self.remove(name)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Makes `bytes` the content of a file in it, at once.
     ///
     /// # Errors
     /// As [`Output::prepare`] and [`Output::write`].
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
         Output::prepare(&self.0.join(name))?.write(bytes)
+    }
+
+    /// Makes what `content` writes the content of a file in it, at once.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_with(
+        &self,
+        name: &str,
+        content: impl FnOnce(&mut fs::File) -> io::Result<()>,
+    ) -> Result<(), OutputError> {
+        Output::prepare(&self.0.join(name))?.write_with(content)
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.0
     }
 
     /// Removes a file if it is there.
@@ -156,7 +203,7 @@ impl OutputFolder {
     pub fn remove(&self, name: &str) -> Result<(), OutputError> {
         let path = self.0.join(name);
         match fs::remove_file(&path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
                 Err(OutputError::Refused(path, error))
             }
             _ => Ok(()),

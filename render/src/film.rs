@@ -26,7 +26,7 @@ use rayon::prelude::*;
 const BATCH: usize = 512;
 
 /// The replicates of a pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 struct Pixel {
     /// Samples of each replicate.
     samples: u32,
@@ -60,7 +60,7 @@ pub struct Due {
 }
 
 /// Pixels in row-major order, row 0 at the top: or any other receivers, in one row.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Film {
     size: [usize; 2],
     replicates: u32,

@@ -1,13 +1,14 @@
 //! Lightmaps: the light of a scene in textures that its surfaces are addressed by.
 //!
 //! The way of the light through this module: faces get places in pages ([`unwrap`], [`atlas`]), texels get points on
-//! them ([`luxels`]), the points become receivers ([`receivers`]), light is gathered there ([`bake`]), and what lies
+//! them ([`luxels`]), the points become receivers ([`receivers`]), faces under thin walls are cut ([`walls`], [`mod@cut`]), light is gathered ([`bake`]), and what lies
 //! between and beside the charts is filled ([`dilation`]) and fitted ([`fit`], [`seams`]) so that filtered look-ups are right.
 //! [`lookup`] is how an engine reads the result, [`view`] how it shows it, and [`mod@target`] what it wants texels to hold;
 //! [`export`] writes the scene with its new coordinates, [`manifest`] what is where, [`mod@page`] all of it as a page to look at.
 
 pub mod atlas;
 pub mod bake;
+pub mod cut;
 pub mod denoise;
 pub mod dilation;
 pub mod export;
@@ -24,3 +25,4 @@ pub mod seams;
 pub mod target;
 pub mod unwrap;
 pub mod view;
+pub mod walls;

@@ -51,7 +51,7 @@ pub fn baked(scene: &Scene, side: usize, error: f64) -> Baked<'_> {
         block_align: false,
     };
     let atlas = UvUnwrap
-        .unwrap(scene, &config, &|_, _| true)
+        .unwrap(scene, &[], &config, &|_, _| true)
         .expect("an atlas");
     let luxels = Luxels::new(&world, &atlas, 0.5);
     let config = AdaptiveConfig {
@@ -60,9 +60,9 @@ pub fn baked(scene: &Scene, side: usize, error: f64) -> Baked<'_> {
         most_patches: usize::MAX,
         seed: 0,
     };
-    let found = bake(&world, &luxels, &config, &mut Until(error)).expect("a mesh");
+    let found = bake(&world, &luxels, &config, None, &mut Until(error)).expect("a mesh");
     let gathered = found.expect("nobody stops it").gathered;
-    let maps = finish(scene, &atlas, &luxels, &gathered, Smoothing::NonLocalMeans);
+    let maps = finish(&world, &atlas, &luxels, &gathered, Smoothing::NonLocalMeans);
     Baked {
         world,
         atlas,

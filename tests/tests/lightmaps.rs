@@ -112,6 +112,54 @@ fn two_rooms(between: Vec<Polygon>) -> Scene {
     )
 }
 
+/// Nor does filtering carry light through a wall that is thinner than two texels: the floor has a chart on each side of it.
+#[test]
+fn filtering_does_not_leak_through_thin_walls() {
+    let sheet = parallelogram(DVec3::new(1.937, 0.0, 0.0), DVec3::Y * 2.0, DVec3::Z * 2.0);
+    // 3 cm where a texel is about 4 cm wide.
+    let thin = solid_box(DVec3::new(1.9, 0.0, 0.0), DVec3::new(1.93, 2.0, 2.0));
+    for (name, wall, faces) in [
+        ("a sheet", vec![sheet.clone(), flipped(sheet)], [1.937; 2]),
+        ("a thin wall", thin, [1.9, 1.93]),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let scene = scene_files::write(&two_rooms(wall), folder.path(), "");
+        let output = folder.path().join("baked");
+        let options = ["--size", "192", "--error", "3%", "-q"];
+        let arguments = ["bake", arg(&scene), "-o", arg(&output)];
+        luxel(&[&arguments[..], &options[..]].concat()).assert_success();
+        // On floor, ceiling and a wall, from a tenth of a millimetre to ten centimetres beside the thin one.
+        let distances = [1e-4, 1e-3, 1e-2, 3e-2, 0.1];
+        let of_side = |x: f64, away: f64| {
+            distances.into_iter().flat_map(move |distance| {
+                (0..9).flat_map(move |along| {
+                    let (x, along) = (x + away * distance, 0.15 + 0.2 * f64::from(along));
+                    [
+                        (DVec3::new(x, 0.0, along), DVec3::Y),
+                        (DVec3::new(x, 2.0, along), -DVec3::Y),
+                        (DVec3::new(x, along, 0.0), DVec3::Z),
+                    ]
+                })
+            })
+        };
+        let values = |x: f64, away: f64| -> Vec<f64> {
+            let (positions, normals): (Vec<_>, Vec<_>) = of_side(x, away).unzip();
+            let found = look_up(&output, &positions, &normals);
+            let value = |found: &Option<_>| {
+                let [value, _]: [Rgb; 2] = found.expect("a face");
+                value.max_element()
+            };
+            found.iter().map(value).collect()
+        };
+        let (lit, dark) = (values(faces[0], -1.0), values(faces[1], 1.0));
+        let [brightest, leak] =
+            [&lit, &dark].map(|values| values.iter().copied().fold(0.0, f64::max));
+        // The lamp is in view of all of the lit side.
+        assert!(lit.iter().all(|value| *value > 0.1), "{name}: {lit:?}");
+        assert!(leak <= 1e-6 * brightest, "{name}: {leak} of {brightest}");
+    }
+}
+
 /// No light comes through a wall, whether it has no thickness, stands on the floor, or goes through floor and ceiling: whatever is
 /// filled, smoothed and fitted, dark luxels stay darker than a millionth of the lit ones.
 #[test]
@@ -178,7 +226,7 @@ fn seams_do_not_show() {
     let wall = bent_wall(DVec3::new(2.9, 0.01, 1.9), 1.0, 1.8);
     push_smooth(&mut scene, "bent wall", 0.6, [24, 4], wall);
     let baked = baked(&scene, 256, 0.02);
-    let seams = matched(&baked.atlas, &scene);
+    let seams = matched(&baked.atlas, &baked.world);
     let of_raw = steps(&baked.maps.raw, &seams);
     let [largest, typical] = steps(&baked.maps.map, &seams);
     println!(

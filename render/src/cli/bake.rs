@@ -5,9 +5,11 @@ mod footprint;
 mod gathered;
 mod places;
 
+use super::checkpoint::{AtLuxels, Keeper, Options, Resume};
 use super::exit::{ExitCode, Failure};
 use super::footprint::Footprint;
 use super::goal::Goal;
+use super::interrupt::Listening;
 use super::memory;
 use super::scene;
 use super::stated::StatedError;
@@ -16,31 +18,48 @@ use crate::files::OutputFolder;
 use crate::integrators::ao::Falloff;
 use crate::lightmap::atlas::Atlas;
 use crate::lightmap::bake::{self, Finished, Luxels, Smoothing};
+use crate::lightmap::cut::{self, CutScene};
 use crate::lightmap::manifest::{self, Manifest};
 use crate::lightmap::target::Target;
+use crate::lightmap::walls;
 use clap::ValueEnum;
 use deliver::Delivery;
-use gathered::AtLuxels;
 use luxel_scenes::Scene;
 use luxel_solver::gather::Components;
 use luxel_solver::world::World;
+use places::Charts;
+use serde::Serialize;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Bake the light of a scene into textures
 ///
 /// Writes a folder: the lightmaps as linear EXR, their standard error, the scene as glTF and OBJ with the lightmap's texture
 /// coordinates, manifest.json, which says what is where and in which unit, and pictures to look at.
-#[derive(clap::Args)]
+#[derive(clap::Args, Serialize)]
 pub(super) struct Bake {
     /// Scene file (.toml), or geometry (.obj, .gltf, .glb)
+    #[serde(skip)]
     scene: PathBuf,
 
     /// Folder to write to; it is made when it does not exist
     #[arg(short, long, value_name = "DIR")]
+    #[serde(skip)]
     output: PathBuf,
+
+    /// Go on from the checkpoint in the folder, if there is one, to what would have come out without the interruption
+    #[arg(long)]
+    #[serde(skip)]
+    resume: bool,
+
+    /// How often to write a checkpoint to the folder, beside the one when Ctrl-C ends the work
+    #[arg(long, value_name = "T", default_value = "1m", value_parser = super::goal::parse_time)]
+    #[serde(skip)]
+    checkpoint_every: Duration,
 
     /// Who is to show the maps: sets what a texel holds, and adds a file that shows how to load them
     #[arg(long = "for", value_enum, default_value = "raw", value_name = "WHOM")]
+    #[serde(rename = "for")]
     target: Target,
 
     /// What the maps hold; for several, separated by commas, there is a set of maps each, the first called lightmap
@@ -96,7 +115,8 @@ pub(super) struct Bake {
 }
 
 /// What smooths noise.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
 enum Denoise {
     /// Nothing
     None,
@@ -105,7 +125,8 @@ enum Denoise {
 }
 
 /// What is baked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
 enum Include {
     /// All light
     All,
@@ -129,11 +150,32 @@ impl Include {
     }
 }
 
+/// Where a scene is to be lit.
+struct Placed {
+    atlas: Atlas,
+    charts: Charts,
+    luxels: Luxels,
+    held: Footprint,
+}
+
+impl Placed {
+    /// The scene with faces cut at thin walls; `None` where there is nothing to cut.
+    fn cut(&self, world: &World<'_>) -> Option<CutScene> {
+        if self.charts == Charts::Given {
+            return None;
+        }
+        let planes = walls::cuts(world, &self.atlas, &self.luxels);
+        (!planes.is_empty()).then(|| cut::cut(world.scene(), &planes))
+    }
+}
+
 /// A finished bake.
 struct Baked {
     atlas: Atlas,
     luxels: Luxels,
     layers: Vec<Layer>,
+    /// What was gathered is delivered: only a second wish to stop ends that.
+    _listening: Listening,
 }
 
 /// One set of maps.
@@ -157,23 +199,48 @@ impl Bake {
         let context = &session.context;
         let goal = context.common.goal(context.started);
         Footprint::to_prepare(scene).require(context, || None)?;
+        let options = Options::new(&self, context)?;
         let delivered = context.common.install(|| {
-            let world = World::new(scene);
+            let keeper = Keeper::new(&folder, scene, options, self.checkpoint_every, context);
+            if self.resume {
+                folder.remove_temporaries()?;
+                keeper.take_up(Resume::GoOn)?;
+            } else {
+                keeper.take_up(Resume::Anew)?;
+            }
+            let cut;
+            let mut world = World::new(scene);
             if self.include.iter().any(|include| *include != Include::Ao) {
                 scene::require_light(&world)?;
             }
-            let Some(baked) = self.bake(&world, &goal, context)? else {
+            let mut placed = self.place(&world, &[], &goal, context)?;
+            let mut corners = None;
+            if let Some(found) = placed.cut(&world) {
+                cut = found;
+                world = World::new(&cut.scene);
+                placed = self.place(&world, &cut.edges, &goal, context)?;
+                corners = Some(cut.corners.as_slice());
+            }
+            let Some(baked) = self.bake(&world, placed, &goal, &keeper, context)? else {
+                keeper.tell();
                 return Ok(None);
             };
+            let is_interrupted = context.interrupt.is_set();
             let delivery = Delivery {
                 folder: &folder,
                 world: &world,
                 origin: loaded.origin.as_ref(),
+                corners,
                 baked: &baked,
                 target: self.target,
                 seed: context.common.seed,
             };
             let manifest = delivery.write()?;
+            if is_interrupted {
+                keeper.tell();
+            } else {
+                keeper.finish()?;
+            }
             Ok::<_, Failure>(Some((manifest, baked.layers)))
         })??;
         let Some((manifest, layers)) = delivered else {
@@ -260,14 +327,15 @@ impl Bake {
         session.print(&text)
     }
 
-    /// Bakes a scene; `None` when it was stopped before all maps were had.
-    fn bake(
+    /// Finds the places and luxels of a scene, whose faces are to be parted at edges for which `cuts` is true.
+    fn place(
         &self,
         world: &World<'_>,
+        cuts: &[bool],
         goal: &Goal,
         context: &Context<'_>,
-    ) -> Result<Option<Baked>, Failure> {
-        let atlas = self.places(world, context)?;
+    ) -> Result<Placed, Failure> {
+        let (atlas, charts) = self.places(world, cuts, context)?;
         // At least the texels that faces cover: what does not fit then is refused before luxels are looked for.
         let covered: f64 = atlas.object_texels(world.scene()).iter().sum();
         self.require_memory(world, &atlas, covered as usize, goal, context)?;
@@ -283,21 +351,53 @@ impl Bake {
                 ),
             ));
         }
+        Ok(Placed {
+            atlas,
+            charts,
+            luxels,
+            held,
+        })
+    }
+
+    /// Bakes a scene; `None` when it was stopped before all maps were had.
+    fn bake<'r>(
+        &self,
+        world: &World<'_>,
+        placed: Placed,
+        goal: &Goal,
+        keeper: &Keeper<'_, 'r>,
+        context: &Context<'r>,
+    ) -> Result<Option<Baked>, Failure> {
+        let Placed {
+            atlas,
+            luxels,
+            held,
+            ..
+        } = placed;
+        let listening = context.interrupt.listen();
         let mut layers = Vec::new();
-        for &include in &self.include {
-            let gathered = match include.components() {
-                Some(components) => self.light(world, &luxels, components, &held, goal, context)?,
-                None => self.occlusion(world, &luxels, goal, context),
+        for (index, &include) in self.include.iter().enumerate() {
+            let gathered = match (keeper.complete(index), include.components()) {
+                (Some(complete), _) => Some(complete),
+                (None, Some(components)) => {
+                    self.light(world, &luxels, components, &held, goal, keeper, context)?
+                }
+                (None, None) => self.occlusion(world, &luxels, goal, keeper, context),
             };
             let Some(gathered) = gathered else {
                 return Ok(None);
             };
-            layers.push(self.layer(world, &atlas, &luxels, include, gathered));
+            layers.push(self.layer(world, &atlas, &luxels, include, &gathered));
+            let is_last = index + 1 == self.include.len();
+            if !is_last && !context.interrupt.is_set() {
+                keeper.add(index, gathered);
+            }
         }
         Ok(Some(Baked {
             atlas,
             luxels,
             layers,
+            _listening: listening,
         }))
     }
 
@@ -308,18 +408,18 @@ impl Bake {
         atlas: &Atlas,
         luxels: &Luxels,
         include: Include,
-        gathered: AtLuxels,
+        gathered: &AtLuxels,
     ) -> Layer {
         let smoothing = match self.denoise {
             Denoise::None => Smoothing::None,
             Denoise::Builtin => Smoothing::NonLocalMeans,
         };
-        let maps = bake::finish(world.scene(), atlas, luxels, &gathered.values, smoothing);
+        let maps = bake::finish(world, atlas, luxels, &gathered.values, smoothing);
         let [of_luxels, total] = [&maps.raw, &maps.map].map(bake::relative_error);
         Layer {
             include,
             maps,
-            stated: gathered.stated,
+            stated: gathered.stated.clone(),
             error: manifest::Error {
                 luxels: of_luxels,
                 filtering: (total * total - of_luxels * of_luxels).max(0.0).sqrt(),

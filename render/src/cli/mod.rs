@@ -5,6 +5,7 @@
 
 mod bake;
 mod check;
+mod checkpoint;
 mod common;
 mod converge;
 mod dense;

@@ -4,7 +4,7 @@ use super::exit::{ExitCode, Failure};
 use super::footprint::{Footprint, held_back, larger_error, largest};
 use super::goal::Goal;
 use super::memory;
-use super::refine::refine;
+use super::refine::{Refined, refine};
 use super::scene;
 use super::stated::StatedError;
 use super::steering::{Steering, first_error};
@@ -324,11 +324,12 @@ impl Probe {
         add: impl FnMut(&mut Film, &[u32], &dyn Progress),
     ) -> Option<Found> {
         let mut steering = Steering::new(context, goal);
-        let mut film = Film::new([receivers, 1], REPLICATES);
+        let film = Film::new([receivers, 1], REPLICATES);
         let fewest = adaptive::fewest_rays(receivers) as u32;
         let each = |all: u32| (all / (REPLICATES * rays)).max(1);
         let first = self.rays.map_or(each(fewest).max(FIRST_SAMPLES), each);
-        let error = refine(&mut film, first, Alike::Values, goal, &mut steering, add)?;
+        let start = Refined::first(film, first);
+        let (film, error) = refine(start, Alike::Values, goal, &mut steering, add)?;
         let all_rays = film.sample_counts().max * rays;
         let alike = match self.quantity {
             Quantity::Ao => Alike::Fractions { rays: all_rays },

@@ -9,6 +9,8 @@ use super::goal::Goal;
 use super::steering::{CONFIDENCE, Steering};
 use crate::film::{Alike, Film, FilmError};
 use crate::progress::Progress;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// Most samples of a replicate: sequences have 2³² points, of which a sample may use several.
 const MAX_SAMPLES: u32 = 1 << 24;
@@ -26,28 +28,60 @@ const STALLED: f64 = 0.95;
 /// Pieces of a round, after each of which it may be stopped: a film is valid after any sample.
 const PIECES: u32 = 16;
 
-/// Exposes `film` by `add`, which adds some samples to each replicate of every pixel, until `steering`
-/// is satisfied; `first` samples in the first round, then more where the noise is if pixels are `alike`
-/// by neighbourhood, else evenly. `None` when it was stopped before there was any sample.
+/// A film between two pieces of its refinement.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Refined<'a> {
+    film: Cow<'a, Film>,
+    round: Cow<'a, Round>,
+}
+
+impl Refined<'_> {
+    /// Nothing exposed; each pixel is to take `first` samples of each replicate.
+    pub(super) fn first(film: Film, first: u32) -> Self {
+        let round = Round {
+            further: film.evenly(first),
+            pieces: 0,
+            before: None,
+        };
+        Self {
+            film: Cow::Owned(film),
+            round: Cow::Owned(round),
+        }
+    }
+}
+
+/// A round of exposure.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Round {
+    /// Samples of each replicate, by pixel.
+    further: Vec<u32>,
+    /// Pieces of it that have been exposed.
+    pieces: u32,
+    /// Mean number of samples and noise, when samples were half as many.
+    before: Option<(f64, f64)>,
+}
+
+/// Exposes a film by `add`, which adds some samples to each replicate of every pixel, until `steering`
+/// is satisfied: what is due of the round in progress, then more where the noise is if pixels are `alike`
+/// by neighbourhood, else evenly. Returns the film with its error; `None` when it was stopped before all pixels had a sample.
 pub(super) fn refine(
-    film: &mut Film,
-    first: u32,
+    refined: Refined<'_>,
     alike: Alike,
     goal: Option<&Goal>,
     steering: &mut Steering<'_, '_>,
     mut add: impl FnMut(&mut Film, &[u32], &dyn Progress),
-) -> Option<FilmError> {
+) -> Option<(Film, FilmError)> {
     let error = goal.and_then(|goal| goal.error).map(|error| error.0);
-    let mut round = film.evenly(first);
-    let mut before: Option<(f64, f64)> = None;
+    let mut film = refined.film.into_owned();
+    let mut round = refined.round.into_owned();
     loop {
-        let cost = film.cost(&round);
+        let cost = round.cost(&film);
         let share = steering.allow(cost as f64);
         if share > 0.0 {
-            shorten(&mut round, share);
-            let cost = film.cost(&round);
+            round.shorten(share);
+            let cost = round.cost(&film);
             steering.start("sampling", cost as f64, cost as usize);
-            expose_in_pieces(film, &round, steering, &mut add);
+            expose_in_pieces(&mut film, &mut round, steering, &mut add);
         }
         let samples = film.sample_counts();
         if samples.min == 0 {
@@ -56,7 +90,7 @@ pub(super) fn refine(
         let reached = film.relative_error(alike);
         let total = reached.total();
         if steering.judge(total) || share < 1.0 || steering.must_stop() {
-            return Some(reached);
+            return Some((film, reached));
         }
         // Without an error to reach, time ends the work.
         let aim = error.map_or(0.5 * total, |error| error / (CONFIDENCE * CONFIDENCE));
@@ -67,22 +101,27 @@ pub(super) fn refine(
             .powi(2)
             .clamp(MIN_GROWTH, MAX_GROWTH);
         let hopeless = error.is_some_and(|error| reached.discretisation * CONFIDENCE > error);
-        let stalled = before.is_some_and(|(few, noise)| {
+        let stalled = round.before.is_some_and(|(few, noise)| {
             samples.mean >= 2.0 * few && reached.sampling > STALLED * noise
         });
-        round = match alike {
+        let mut further = match alike {
             Alike::Neighbours => film.where_noisy(growth),
             Alike::Values | Alike::Fractions { .. } => {
                 let each = samples.max / film.replicates();
                 film.evenly((f64::from(each) * (growth - 1.0)).ceil() as u32)
             }
         };
-        limit(film, &mut round);
-        if film.cost(&round) == 0 || hopeless || stalled {
-            return Some(reached);
+        limit(&film, &mut further);
+        if film.cost(&further) == 0 || hopeless || stalled {
+            return Some((film, reached));
         }
-        if before.is_none_or(|(few, _)| samples.mean >= 2.0 * few) {
-            before = Some((samples.mean, reached.sampling));
+        round.further = further;
+        round.pieces = 0;
+        if round
+            .before
+            .is_none_or(|(few, _)| samples.mean >= 2.0 * few)
+        {
+            round.before = Some((samples.mean, reached.sampling));
         }
     }
 }
@@ -95,11 +134,33 @@ fn limit(film: &Film, round: &mut [u32]) {
     }
 }
 
-/// Leaves a share of a round, but something of what it gives to a pixel.
-fn shorten(round: &mut [u32], share: f64) {
-    if share < 1.0 {
-        for further in round.iter_mut().filter(|further| **further > 0) {
-            *further = ((f64::from(*further) * share) as u32).max(1);
+impl Round {
+    fn all_pieces(&self) -> u32 {
+        let most = self.further.iter().copied().max();
+        most.unwrap_or(0).min(PIECES)
+    }
+
+    /// Samples of each replicate between two of the ends of pieces, by pixel.
+    fn between(&self, from: u32, to: u32) -> Vec<u32> {
+        let pieces = u64::from(self.all_pieces().max(1));
+        let until = |further: u32, end: u32| (u64::from(further) * u64::from(end) / pieces) as u32;
+        self.further
+            .iter()
+            .map(|&further| until(further, to) - until(further, from))
+            .collect()
+    }
+
+    /// Samples that are left of it, all replicates together.
+    fn cost(&self, film: &Film) -> u64 {
+        film.cost(&self.between(self.pieces, self.all_pieces()))
+    }
+
+    /// Leaves a share of a round that has not begun, but something of what it gives to a pixel.
+    fn shorten(&mut self, share: f64) {
+        if share < 1.0 && self.pieces == 0 {
+            for further in self.further.iter_mut().filter(|further| **further > 0) {
+                *further = ((f64::from(*further) * share) as u32).max(1);
+            }
         }
     }
 }
@@ -107,22 +168,19 @@ fn shorten(round: &mut [u32], share: f64) {
 /// Exposes a film piece by piece until `steering` must stop.
 fn expose_in_pieces(
     film: &mut Film,
-    round: &[u32],
+    round: &mut Round,
     steering: &Steering<'_, '_>,
     add: &mut impl FnMut(&mut Film, &[u32], &dyn Progress),
 ) {
-    let pieces = round.iter().copied().max().unwrap_or(0).min(PIECES);
-    for piece in 0..pieces {
+    for piece in round.pieces..round.all_pieces() {
         if steering.must_stop() {
             return;
         }
-        let until = |further: u32, piece: u32| {
-            (u64::from(further) * u64::from(piece) / u64::from(pieces)) as u32
-        };
-        let part: Vec<u32> = round
-            .iter()
-            .map(|&further| until(further, piece + 1) - until(further, piece))
-            .collect();
-        add(film, &part, &steering.piece());
+        add(film, &round.between(piece, piece + 1), &steering.piece());
+        round.pieces = piece + 1;
+        steering.keep_film(Refined {
+            film: Cow::Borrowed(film),
+            round: Cow::Borrowed(round),
+        });
     }
 }

@@ -7,7 +7,7 @@ use super::exit::{ExitCode, Failure};
 use super::footprint::{Footprint, held_back};
 use super::goal::Goal;
 use super::memory;
-use super::refine::refine;
+use super::refine::{Refined, refine};
 use super::scene;
 use super::stated::StatedError;
 use super::steering::Steering;
@@ -314,13 +314,13 @@ impl Render {
             Method::Radiosity | Method::Path | Method::Ao => FIRST_SAMPLES,
         };
         let first = fixed.unwrap_or(Samples::new(few, seed));
-        let mut film = Film::new(frame.size(), first.replicates);
+        let film = Film::new(frame.size(), first.replicates);
         let mut steering = Steering::new(context, goal);
         let add = |film: &mut Film, further: &[u32], progress: &dyn Progress| {
             expose_further(film, integrator, frame, seed, further, progress);
         };
-        let (samples, alike) = (first.per_replicate, Alike::Neighbours);
-        let error = refine(&mut film, samples, alike, goal, &mut steering, add)?;
+        let start = Refined::first(film, first.per_replicate);
+        let (film, error) = refine(start, Alike::Neighbours, goal, &mut steering, add)?;
         let level: f64 = film.values().map(|value| value.element_sum() / 3.0).sum();
         let level = level / film.values().count() as f64;
         let solver = if level > 0.0 {

@@ -3,9 +3,10 @@
 use super::exit::ExitCode;
 use super::goal::Goal;
 use luxel_solver::gather::ErrorParts;
+use serde::{Deserialize, Serialize};
 
 /// Where an error comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Source {
     /// The iteration of the solver.
     Solver,
@@ -57,7 +58,7 @@ impl Source {
 }
 
 /// Relative errors, rms over mean, by their source.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct StatedError(Vec<(Source, f64)>);
 
 impl StatedError {
@@ -143,7 +144,7 @@ impl StatedError {
 }
 
 /// A percentage as a person would write it.
-fn percent(value: f64) -> f64 {
+pub(super) fn percent(value: f64) -> f64 {
     (value * 1e9).round() / 1e7
 }
 

@@ -2,11 +2,13 @@
 //! interrupt.
 
 use super::Context;
+use super::checkpoint::{Current, Keeper};
 use super::goal::Goal;
 use super::interrupt::{Interrupt, Listening};
+use super::refine::Refined;
 use super::reporter::Reporter;
 use crate::progress::Progress;
-use luxel_solver::adaptive::{Control, Stage};
+use luxel_solver::adaptive::{Checkpoint, Control, Stage};
 use luxel_solver::gather::ErrorParts;
 use std::time::{Duration, Instant};
 
@@ -50,6 +52,7 @@ pub(super) struct Steering<'a, 'r> {
     done: (f64, Duration),
     current: Option<(f64, Instant)>,
     estimate: Option<f64>,
+    keeper: Option<&'a Keeper<'a, 'r>>,
     _listening: Listening,
 }
 
@@ -63,7 +66,21 @@ impl<'a, 'r> Steering<'a, 'r> {
             done: (0.0, Duration::ZERO),
             current: None,
             estimate: None,
+            keeper: None,
             _listening: context.interrupt.listen(),
+        }
+    }
+
+    /// The same, with checkpoints.
+    pub(super) fn keeping(self, keeper: &'a Keeper<'a, 'r>) -> Self {
+        let keeper = Some(keeper);
+        Self { keeper, ..self }
+    }
+
+    /// A piece of a film has been exposed.
+    pub(super) fn keep_film(&self, refined: Refined<'_>) {
+        if let Some(keeper) = self.keeper {
+            keeper.keep(Current::Film(refined));
         }
     }
 
@@ -161,6 +178,12 @@ impl Control for Steering<'_, '_> {
         self.settle();
         self.estimate = Some(parts.total());
         self.goal.is_none_or(|goal| goal.is_met_by(parts.upper()))
+    }
+
+    fn keep(&mut self, checkpoint: Checkpoint<'_>) {
+        if let Some(keeper) = self.keeper {
+            keeper.keep(Current::Gather(checkpoint));
+        }
     }
 }
 

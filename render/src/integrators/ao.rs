@@ -18,7 +18,8 @@ use luxel_solver::sampling::{Frame, Sequence, Stage, cosine_hemisphere};
 use luxel_solver::world::{Receiver, World};
 
 /// How a blocker counts that is nearer than the maximum distance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Falloff {
     /// Fully
     Sharp,

@@ -14,8 +14,8 @@ use super::luxels::{self, Luxel, Placed};
 use super::map::Lightmap;
 use super::receivers::{self, Lit};
 use super::seams::matched;
-use luxel_scenes::{Rgb, Scene};
-use luxel_solver::adaptive::{self, Adaptive, AdaptiveConfig, Control};
+use luxel_scenes::Rgb;
+use luxel_solver::adaptive::{self, Adaptive, AdaptiveConfig, Checkpoint, Control};
 use luxel_solver::gather::{self, Gathered};
 use luxel_solver::pilot::PilotError;
 use luxel_solver::world::World;
@@ -46,7 +46,8 @@ pub struct Baked {
     pub adaptive: Adaptive,
 }
 
-/// Gathers light at luxels until `control` is satisfied; `None` when it stopped before there was any.
+/// Gathers light at luxels until `control` is satisfied, from the start or a checkpoint; `None` when it stopped before
+/// there was any. A checkpoint of other luxels counts for nothing.
 ///
 /// # Errors
 /// As [`adaptive::irradiance`].
@@ -54,10 +55,14 @@ pub fn bake(
     world: &World<'_>,
     luxels: &Luxels,
     config: &AdaptiveConfig,
+    from: Option<Checkpoint<'_>>,
     control: &mut dyn Control,
 ) -> Result<Option<Baked>, PilotError> {
     let receivers = &luxels.lit.receivers;
-    let mut adaptive = adaptive::irradiance(world, receivers, config, control)?;
+    let mut adaptive = match from.filter(|checkpoint| checkpoint.is_of(receivers.len())) {
+        Some(checkpoint) => adaptive::resume(world, receivers, config, checkpoint, control)?,
+        None => adaptive::irradiance(world, receivers, config, control)?,
+    };
     if adaptive.tallies.is_empty() {
         return Ok(None);
     }
@@ -87,7 +92,7 @@ pub struct Finished {
 /// # Panics
 /// When there is not one of `gathered` for each luxel.
 pub fn finish(
-    scene: &Scene,
+    world: &World<'_>,
     atlas: &Atlas,
     luxels: &Luxels,
     gathered: &[Gathered],
@@ -107,7 +112,7 @@ pub fn finish(
     };
     let values: Vec<Rgb> = lit.luxels.iter().zip(gathered).map(value).collect();
     dilate(atlas, &lit.luxels, &luxels.triangles, &mut map);
-    let seams = matched(atlas, scene);
+    let seams = matched(atlas, world);
     fit(atlas, &mut map, &lit.luxels, &values, &seams);
     Finished { raw, map }
 }

@@ -155,7 +155,7 @@ pub struct Error {
 }
 
 /// Where the flux goes.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Energy {
     /// Sent out by surfaces and lights, as far as it arrives.
     pub emitted: [f64; 3],

@@ -69,13 +69,15 @@ pub enum UnwrapError {
 
 /// Gives the faces of all objects whose `lightmap_scale` is not zero places in pages. The same scene and configuration give the same atlas on every machine.
 pub trait Unwrapper {
-    /// Unwraps a scene. `progress` hears of done and all pieces of a stage and stops the work by false.
+    /// Unwraps a scene. Edges from a corner to the next of its face for which `cuts` is true separate charts; there is one for
+    /// each corner, or none. `progress` hears of done and all pieces of a stage and stops the work by false.
     ///
     /// # Errors
     /// When pages are too small or the density too large, or `progress` stopped the work.
     fn unwrap(
         &self,
         scene: &Scene,
+        cuts: &[bool],
         config: &UnwrapConfig,
         progress: &(dyn Fn(usize, Option<usize>) -> bool + Sync),
     ) -> Result<Atlas, UnwrapError>;
@@ -98,16 +100,19 @@ struct Mesh {
     corners: Vec<usize>,
     /// Number of the face that each triangle was cut from, within the object.
     polygons: Vec<u32>,
+    /// Whether charts end at each edge of a triangle, from a corner to the next.
+    seams: Vec<[bool; 3]>,
 }
 
 impl Unwrapper for UvUnwrap {
     fn unwrap(
         &self,
         scene: &Scene,
+        cuts: &[bool],
         config: &UnwrapConfig,
         progress: &(dyn Fn(usize, Option<usize>) -> bool + Sync),
     ) -> Result<Atlas, UnwrapError> {
-        let meshes = meshes(scene);
+        let meshes = meshes(scene, cuts);
         let used: Vec<usize> = (0..meshes.len())
             .filter(|&object| {
                 scene.objects[object].lightmap_scale > 0.0 && !meshes[object].indices.is_empty()
@@ -120,6 +125,7 @@ impl Unwrapper for UvUnwrap {
             .iter()
             .map(|&object| uvunwrap::MeshInput {
                 polygons: Some(&meshes[object].polygons),
+                seams: Some(&meshes[object].seams),
                 scale: scene.objects[object].lightmap_scale as f32,
                 ..uvunwrap::MeshInput::new(&meshes[object].positions, &meshes[object].indices)
             })
@@ -155,7 +161,7 @@ impl Unwrapper for UvUnwrap {
 
 /// The objects of a scene as meshes. Corners of one position and normal are one vertex: surfaces that are smooth over an edge are
 /// cut there last.
-fn meshes(scene: &Scene) -> Vec<Mesh> {
+fn meshes(scene: &Scene, cuts: &[bool]) -> Vec<Mesh> {
     let (lower, upper) = scene.bounds().unwrap_or_default();
     let middle = (lower + upper) / 2.0;
     let mut meshes: Vec<Mesh> = scene.objects.iter().map(|_| Mesh::default()).collect();
@@ -186,6 +192,14 @@ fn meshes(scene: &Scene) -> Vec<Mesh> {
                 mesh.corners.push(corner);
             }
             mesh.polygons.push(polygon);
+            // The first edge of the fan's first triangle and the last of its last are the polygon's, those between its own.
+            let is_cut = |corner: usize| cuts.get(corner).copied().unwrap_or(false);
+            let (is_first, is_last) = (next == corners.start + 1, next + 2 == corners.end);
+            mesh.seams.push([
+                is_first && is_cut(corners.start),
+                is_cut(next),
+                is_last && is_cut(next + 1),
+            ]);
         }
     }
     meshes

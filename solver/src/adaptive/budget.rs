@@ -244,8 +244,15 @@ impl Item {
     /// The square of a part with its exponent, for a budget.
     fn squares(&self, budget: f64) -> impl Iterator<Item = (f64, f64)> {
         let ratio = self.spent / budget;
-        let at =
-            move |&(square, exponent): &(f64, f64)| (square * ratio.powf(2.0 * exponent), exponent);
+        let at = move |&(square, exponent): &(f64, f64)| {
+            // What has no error has none at a budget of nothing, too.
+            let fall = if square > 0.0 {
+                ratio.powf(2.0 * exponent)
+            } else {
+                0.0
+            };
+            (square * fall, exponent)
+        };
         self.parts.iter().map(at)
     }
 
@@ -342,6 +349,21 @@ mod tests {
         assert!((0.0099..=0.01).contains(&predicted(kept)), "{kept:?}");
         let free = plan(0.01, &PARTS, 1000, Changes::All);
         assert!(kept.rays > free.rays && free.patches > kept.patches);
+    }
+
+    /// Of reflected light alone no shadow rays are cast, and none are planned; the others do not wait for them.
+    #[test]
+    fn what_is_not_cast_is_not_planned() {
+        let parts = ErrorParts {
+            direct: 0.0,
+            ..PARTS
+        };
+        let none = Penumbrae::even(1000, 0, 0, 0.0);
+        let planned = SPENT.for_error(0.01, &parts, &none, 1000, Changes::Rays);
+        assert_eq!(planned.shadow_rays, [0]);
+        let usual = plan(0.01, &parts, 1000, Changes::Rays);
+        assert_eq!(planned.budget.rays, usual.rays);
+        assert!(usual.rays > 2 * SPENT.rays);
     }
 
     #[test]

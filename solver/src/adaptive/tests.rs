@@ -71,6 +71,26 @@ fn it_goes_on_until_the_error_suits() {
     assert!(fine.budget.rays > rough.budget.rays);
 }
 
+/// Reflected light alone needs no shadow rays: that none are cast does not end the work.
+#[test]
+fn reflected_light_alone_reaches_its_error() {
+    let scene = generate::cornell_box();
+    let world = World::new(&scene);
+    for side in [7, 65] {
+        let receivers = on_the_floor(&world, side);
+        let config = AdaptiveConfig {
+            error: 0.008,
+            components: Components::Indirect,
+            most_patches: usize::MAX,
+            seed: 1,
+        };
+        let result = irradiance(&world, &receivers, &config, &mut unlimited(0.008));
+        let result = result.expect("a scene");
+        assert_eq!(result.ending, Ending::Reached, "{:?}", result.parts);
+        assert_eq!(result.budget.shadow_rays, 0);
+    }
+}
+
 #[test]
 fn it_may_be_stopped_anywhere_and_keeps_the_last_complete_state() {
     let (complete, rounds) = run(0.02, usize::MAX);

@@ -8,6 +8,7 @@ use crate::image::exr::{self, Picture};
 use crate::image::{Image, png};
 use crate::integrators::{Samples, expose};
 use crate::lightmap::bake::Finished;
+use crate::lightmap::cut::Weights;
 use crate::lightmap::export::glb::glb;
 use crate::lightmap::export::obj::obj;
 use crate::lightmap::manifest::{self, Bevy, Files, Manifest, Page, Sampling, Units};
@@ -32,6 +33,8 @@ pub(super) struct Delivery<'a> {
     pub(super) folder: &'a OutputFolder,
     pub(super) world: &'a World<'a>,
     pub(super) origin: Option<&'a GltfOrigin>,
+    /// What the corners of the scene are made of, where its faces were cut.
+    pub(super) corners: Option<&'a [Weights]>,
     pub(super) baked: &'a Baked,
     pub(super) target: Target,
     pub(super) seed: u64,
@@ -76,8 +79,10 @@ impl Delivery<'_> {
         }
         let files = lightmap.pages.iter().map(|page| page.file.clone());
         let files: Vec<String> = files.collect();
-        self.folder
-            .write("scene.glb", &glb(scene, self.origin, atlas, &files)?)?;
+        self.folder.write(
+            "scene.glb",
+            &glb(scene, self.origin, self.corners, atlas, &files)?,
+        )?;
         let (geometry, materials) = obj(scene, atlas, "scene.mtl");
         self.folder.write("scene.mtl", &materials)?;
         self.folder.write("scene.obj", &geometry)?;

@@ -2,16 +2,16 @@
 
 use super::Bake;
 use crate::cli::Context;
+use crate::cli::checkpoint::{AtLuxels, Current, Keeper};
 use crate::cli::exit::Failure;
 use crate::cli::footprint::{Footprint, held_back};
 use crate::cli::goal::Goal;
-use crate::cli::refine::refine;
+use crate::cli::refine::{Refined, refine};
 use crate::cli::stated::StatedError;
 use crate::cli::steering::{Steering, first_error};
 use crate::film::{Alike, Film};
 use crate::integrators::ao::{AmbientOcclusion, Config};
 use crate::lightmap::bake::{self, Luxels};
-use crate::lightmap::manifest;
 use crate::progress::Progress;
 use luxel_scenes::Irradiance;
 use luxel_solver::adaptive::{AdaptiveConfig, Ending};
@@ -22,24 +22,17 @@ use luxel_solver::world::World;
 const AO_RAYS: u32 = 4;
 const FIRST_AO_SAMPLES: u32 = 2;
 
-/// Values at luxels with their errors.
-pub(super) struct AtLuxels {
-    pub(super) values: Vec<Gathered>,
-    pub(super) stated: StatedError,
-    pub(super) energy: Option<manifest::Energy>,
-    pub(super) patches: usize,
-}
-
 impl Bake {
     /// Light; `None` when it was stopped before there was any.
-    pub(super) fn light(
+    pub(super) fn light<'r>(
         &self,
         world: &World<'_>,
         luxels: &Luxels,
         components: Components,
         held: &Footprint,
         goal: &Goal,
-        context: &Context<'_>,
+        keeper: &Keeper<'_, 'r>,
+        context: &Context<'r>,
     ) -> Result<Option<AtLuxels>, Failure> {
         let error = first_error(Some(goal));
         let first = self.first_patches(error);
@@ -49,8 +42,12 @@ impl Bake {
             most_patches: held.most_patches(world.scene(), first, context),
             seed: context.common.seed,
         };
-        let mut steering = Steering::new(context, Some(goal));
-        let Some(found) = bake::bake(world, luxels, &config, &mut steering)? else {
+        let mut steering = Steering::new(context, Some(goal)).keeping(keeper);
+        let from = match keeper.current() {
+            Some(Current::Gather(checkpoint)) => Some(checkpoint),
+            _ => None,
+        };
+        let Some(found) = bake::bake(world, luxels, &config, from, &mut steering)? else {
             return Ok(None);
         };
         if found.adaptive.ending == Ending::TooManyPatches {
@@ -73,12 +70,13 @@ impl Bake {
     }
 
     /// Ambient occlusion; `None` when it was stopped before there was any.
-    pub(super) fn occlusion(
+    pub(super) fn occlusion<'r>(
         &self,
         world: &World<'_>,
         luxels: &Luxels,
         goal: &Goal,
-        context: &Context<'_>,
+        keeper: &Keeper<'_, 'r>,
+        context: &Context<'r>,
     ) -> Option<AtLuxels> {
         let receivers = &luxels.lit.receivers;
         let config = Config {
@@ -91,10 +89,15 @@ impl Bake {
         let add = |film: &mut Film, samples: &[u32], progress: &dyn Progress| {
             occlusion.at_receivers(film, receivers, samples, progress);
         };
-        let mut steering = Steering::new(context, Some(goal));
-        let mut film = Film::new([receivers.len(), 1], MAX_REPLICATES as u32);
-        let (first, goal) = (FIRST_AO_SAMPLES, Some(goal));
-        let error = refine(&mut film, first, Alike::Values, goal, &mut steering, add)?;
+        let mut steering = Steering::new(context, Some(goal)).keeping(keeper);
+        let start = match keeper.current() {
+            Some(Current::Film(refined)) => refined,
+            _ => Refined::first(
+                Film::new([receivers.len(), 1], MAX_REPLICATES as u32),
+                FIRST_AO_SAMPLES,
+            ),
+        };
+        let (film, error) = refine(start, Alike::Values, Some(goal), &mut steering, add)?;
         let rays = film.sample_counts().max * AO_RAYS;
         let errors = film.errors(Alike::Fractions { rays })?;
         // Openness has a value and a noise, as direct light has.

@@ -10,6 +10,7 @@ use crate::progress::Progress;
 use clap::ValueEnum;
 use luxel_scenes::Scene;
 use luxel_solver::world::World;
+use serde::Serialize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Texels a metre that are aimed at where nothing else is said, and the sides of the pages that this may lead to.
@@ -23,7 +24,8 @@ const USUAL_UTILISATION: f64 = 0.7;
 const SIDE_OF_PAGES: usize = 2048;
 
 /// Where texture coordinates come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub(super) enum Whence {
     /// The scene's own second set where it has one that can be used, else as `unwrap`
     Auto,
@@ -33,13 +35,23 @@ pub(super) enum Whence {
     Unwrap,
 }
 
+/// Whose charts an atlas has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Charts {
+    /// The scene's.
+    Given,
+    /// Those of luxel, which may be cut.
+    Own,
+}
+
 impl Bake {
-    /// The atlas of a scene.
+    /// The atlas of a scene, and whether its charts may still be cut. Edges for which `cuts` is true separate charts.
     pub(super) fn places(
         &self,
         world: &World<'_>,
+        cuts: &[bool],
         context: &Context<'_>,
-    ) -> Result<Atlas, Failure> {
+    ) -> Result<(Atlas, Charts), Failure> {
         let scene = world.scene();
         let side = self.size.unwrap_or_else(|| self.usual_side(scene));
         let config = UnwrapConfig {
@@ -53,11 +65,11 @@ impl Bake {
             padding: usize::from(self.padding),
             block_align: self.block_align,
         };
-        let has_given = !scene.corners.uv1.is_empty();
+        let has_given = !scene.corners.uv1.is_empty() && cuts.is_empty();
         if self.uv == Whence::Keep || self.uv == Whence::Auto && has_given {
             let geometry = world.surfaces().geometry();
             match given(scene, geometry, side) {
-                Ok(atlas) => return Ok(atlas),
+                Ok(atlas) => return Ok((atlas, Charts::Given)),
                 Err(error) if self.uv == Whence::Keep => return Err(error.into()),
                 Err(error) => context
                     .reporter
@@ -67,7 +79,7 @@ impl Bake {
         let reporter = &context.reporter;
         reporter.start("unwrapping", 0);
         let done_before = AtomicUsize::new(0);
-        let atlas = UvUnwrap.unwrap(scene, &config, &|done, _| {
+        let atlas = UvUnwrap.unwrap(scene, cuts, &config, &|done, _| {
             let before = done_before.swap(done, Ordering::Relaxed);
             reporter.advance(done.saturating_sub(before) as u64);
             !context.interrupt.is_set()
@@ -76,7 +88,7 @@ impl Bake {
         match atlas {
             Err(_) if context.interrupt.is_set() => Err(Failure::interrupted()),
             Err(error) => Err(error.into()),
-            Ok(atlas) => Ok(atlas),
+            Ok(atlas) => Ok((atlas, Charts::Own)),
         }
     }
 

@@ -39,7 +39,9 @@ mod views;
 
 use super::pages::Pages;
 use crate::lightmap::atlas::Atlas;
+use crate::lightmap::cut::Weights;
 use luxel_scenes::{GltfOrigin, LoadError, Scene, UnitSystem};
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 /// Why a scene cannot be written as binary glTF.
@@ -104,10 +106,23 @@ struct Baked<'b> {
     atlas: &'b Atlas,
     pages: &'b Pages,
     maps: &'b [String],
+    /// What the corners of faces that were cut are made of.
+    corners: Option<&'b [Weights]>,
+}
+
+impl Baked<'_> {
+    /// The vertices of the scene's file that a corner is made of, with their weights.
+    fn vertices(&self, corner: usize) -> Cow<'_, [(u32, f64)]> {
+        match self.corners {
+            Some(corners) => Cow::Borrowed(&corners[corner]),
+            None => Cow::Owned(vec![(self.scene.corners.vertex[corner], 1.0)]),
+        }
+    }
 }
 
 /// The bytes of a GLB file. `origin` is the file that the scene came from ([`luxel_scenes::Loaded::origin`]), read again here;
-/// `maps` are the file names of the pages.
+/// `maps` are the file names of the pages; `corners` tells of a scene whose faces were cut what its corners are made of
+/// ([`crate::lightmap::cut::CutScene::corners`]).
 ///
 /// # Errors
 /// When the scene's file can no longer be read, a page has no file name, or the bytes are too many for the format.
@@ -117,6 +132,7 @@ struct Baked<'b> {
 pub fn glb(
     scene: &Scene,
     origin: Option<&GltfOrigin>,
+    corners: Option<&[Weights]>,
     atlas: &Atlas,
     maps: &[String],
 ) -> Result<Vec<u8>, GlbError> {
@@ -132,6 +148,7 @@ pub fn glb(
         atlas,
         pages: &pages,
         maps,
+        corners,
     };
     let document = match origin {
         Some(origin) => original::document(baked, origin)?,

@@ -40,7 +40,7 @@ fn unwrapped(scene: &Scene, density: Density) -> Atlas {
         padding: 1,
         block_align: false,
     };
-    let atlas = UvUnwrap.unwrap(scene, &config, &|_, _| true);
+    let atlas = UvUnwrap.unwrap(scene, &[], &config, &|_, _| true);
     atlas.expect("the scene can be unwrapped")
 }
 

@@ -50,7 +50,7 @@ fn groups(baked: Baked, origin: &GltfOrigin) -> Option<Groups> {
     let mut groups = Groups::new();
     for id in scene.face_ids() {
         let face = scene.faces[id.index()];
-        let vertex = scene.corners.vertex[face.first_corner as usize];
+        let (vertex, _) = baked.vertices(face.first_corner as usize)[0];
         let (run, _) = origin.find(vertex)?;
         let key = (run, baked.pages.of(id), face.material);
         groups.entry(key).or_default().push(id);

@@ -1,4 +1,5 @@
 use super::*;
+use crate::lightmap::cut::{Plane, cut};
 use crate::lightmap::export::testing::{atlas, cornell, data, pages, pavilion, reloaded};
 use glam::{DVec3, Vec2};
 use luxel_scenes::{Material, ObjectId, Radiance, Reflectance, Sidedness, load};
@@ -53,7 +54,8 @@ fn a_document_survives_a_round_trip() {
     let scene = &loaded.scene;
     assert_eq!(loaded.warnings, []);
     let atlas = atlas(scene, 256);
-    let file = glb(scene, loaded.origin.as_ref(), &atlas, &maps(&atlas)).expect("it is written");
+    let file =
+        glb(scene, loaded.origin.as_ref(), None, &atlas, &maps(&atlas)).expect("it is written");
     let again = reloaded("a.glb", &[("a.glb", &file)]);
     assert_eq!(again.warnings, []);
     assert_same_faces(scene, &again.scene, &atlas);
@@ -64,7 +66,7 @@ fn a_document_survives_a_round_trip() {
     for (texture, same) in scene.textures.iter().zip(&again.scene.textures) {
         assert_eq!(texture.texels, same.texels);
     }
-    let second = glb(scene, loaded.origin.as_ref(), &atlas, &maps(&atlas));
+    let second = glb(scene, loaded.origin.as_ref(), None, &atlas, &maps(&atlas));
     assert_eq!(
         second.expect("it is written"),
         file,
@@ -72,11 +74,70 @@ fn a_document_survives_a_round_trip() {
     );
 }
 
+/// Positions, normals and texture coordinates are means of those of the file, which is f32: to its rounding they are those of
+/// the faces that were cut.
+#[test]
+fn faces_that_were_cut_are_cut_in_the_document() {
+    const ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
+    let loaded = pavilion();
+    let (lower, upper) = loaded.scene.bounds().expect("faces");
+    let normal = DVec3::new(2.0, 0.3, -1.0).normalize();
+    let plane = Plane {
+        normal,
+        offset: normal.dot(0.5 * (lower + upper)),
+    };
+    let planes = loaded.scene.face_ids().map(|face| (face, vec![plane]));
+    let cut = cut(&loaded.scene, &planes.collect());
+    let scene = &cut.scene;
+    assert!(scene.faces.len() > loaded.scene.faces.len() + 10);
+    let atlas = atlas(scene, 256);
+    let corners = Some(cut.corners.as_slice());
+    let file = glb(
+        scene,
+        loaded.origin.as_ref(),
+        corners,
+        &atlas,
+        &maps(&atlas),
+    );
+    let again = reloaded("a.glb", &[("a.glb", &file.expect("it is written"))]);
+    assert_eq!(again.warnings, []);
+    let again = again.scene;
+    let size = lower.abs().max(upper.abs()).max_element();
+    let fans = scene.faces.iter().flat_map(|face| {
+        let corners: Vec<usize> = face.corners().collect();
+        let fan = (1..corners.len() - 1).map(move |i| [corners[0], corners[i], corners[i + 1]]);
+        fan.collect::<Vec<_>>()
+    });
+    let mut triangles = 0;
+    for (own, face) in fans.zip(&again.faces) {
+        triangles += 1;
+        for (own, corner) in own.into_iter().zip(face.corners()) {
+            let [a, b] = [(scene, own), (&again, corner)]
+                .map(|(scene, corner)| scene.vertices[scene.corners.vertex[corner] as usize]);
+            assert!((a - b).length() <= ROUNDING * size, "{a} {b}");
+            let [a, b] = [(scene, own), (&again, corner)].map(|(s, c)| s.corners.uv0[c].as_dvec2());
+            assert!(
+                (a - b).length() <= ROUNDING * a.length().max(1.0),
+                "{a} {b}"
+            );
+            let [a, b] = [(scene, own), (&again, corner)].map(|(s, c)| s.corners.normal[c]);
+            assert!((a - b).as_dvec3().length() <= 2.0 * ROUNDING, "{a} {b}");
+        }
+    }
+    assert_eq!(triangles, again.faces.len());
+}
+
 #[test]
 fn a_document_keeps_what_luxel_does_not_know() {
     let loaded = pavilion();
     let atlas = atlas(&loaded.scene, 256);
-    let file = glb(&loaded.scene, loaded.origin.as_ref(), &atlas, &maps(&atlas));
+    let file = glb(
+        &loaded.scene,
+        loaded.origin.as_ref(),
+        None,
+        &atlas,
+        &maps(&atlas),
+    );
     let (document, binary) = parts(&file.expect("it is written"));
     assert_eq!(document["asset"]["generator"], "luxel");
     assert_eq!(document["asset"]["copyright"], "The luxel authors");
@@ -170,7 +231,7 @@ fn nodes_on_several_pages_have_a_child_for_each() {
     let scene = cornell();
     let atlas = pages(&scene, 200.0, 160);
     assert!(atlas.pages > 2);
-    let file = glb(&scene, None, &atlas, &maps(&atlas)).expect("it is written");
+    let file = glb(&scene, None, None, &atlas, &maps(&atlas)).expect("it is written");
     assert_pages(&scene, &atlas, &file);
     let again = reloaded("a.glb", &[("a.glb", &file)]).scene;
     assert!((area(&scene) / area(&again) - 1.0).abs() < 1e-5);
@@ -179,7 +240,8 @@ fn nodes_on_several_pages_have_a_child_for_each() {
     let scene = loaded.scene;
     let atlas = pages(&scene, 16.0, 128);
     assert!(atlas.pages > 1);
-    let file = glb(&scene, loaded.origin.as_ref(), &atlas, &maps(&atlas)).expect("it is written");
+    let file =
+        glb(&scene, loaded.origin.as_ref(), None, &atlas, &maps(&atlas)).expect("it is written");
     let again = reloaded("a.glb", &[("a.glb", &file)]).scene;
     assert!((area(&scene) / area(&again) - 1.0).abs() < 1e-12);
     let (document, _) = parts(&file);
@@ -224,7 +286,8 @@ material = "gold"
     let loaded = reloaded("a.toml", &[("a.toml", text.as_bytes())]);
     let scene = &loaded.scene;
     let atlas = atlas(scene, 256);
-    let file = glb(scene, loaded.origin.as_ref(), &atlas, &maps(&atlas)).expect("it is written");
+    let file =
+        glb(scene, loaded.origin.as_ref(), None, &atlas, &maps(&atlas)).expect("it is written");
     let again = reloaded("a.glb", &[("a.glb", &file)]).scene;
     assert!((area(scene) / area(&again) - 1.0).abs() < 1e-6);
     let material = |scene: &Scene, object: &str| {
@@ -253,7 +316,7 @@ fn a_scene_without_a_document_gets_one() {
     let mut scene = cornell();
     scene.materials[0].sidedness = Sidedness::Both;
     let atlas = atlas(&scene, 128);
-    let file = glb(&scene, None, &atlas, &maps(&atlas)).expect("it is written");
+    let file = glb(&scene, None, None, &atlas, &maps(&atlas)).expect("it is written");
     let again = reloaded("a.glb", &[("a.glb", &file)]);
     assert_eq!(again.warnings, []);
     let again = again.scene;
@@ -298,7 +361,7 @@ fn polygons_and_distant_objects_keep_their_shape() {
     ];
     scene.push_face(&corners.map(|corner| far + corner), object, material);
     let atlas = atlas(&scene, 64);
-    let file = glb(&scene, None, &atlas, &maps(&atlas)).expect("it is written");
+    let file = glb(&scene, None, None, &atlas, &maps(&atlas)).expect("it is written");
     let again = reloaded("a.glb", &[("a.glb", &file)]).scene;
     assert_eq!(again.faces.len(), 3);
     assert!((area(&again) - 1.25).abs() < 1e-6);
@@ -311,7 +374,7 @@ fn polygons_and_distant_objects_keep_their_shape() {
 fn pages_without_files_are_refused() {
     let scene = cornell();
     let atlas = atlas(&scene, 64);
-    let error = glb(&scene, None, &atlas, &[]).expect_err("there is no file");
+    let error = glb(&scene, None, None, &atlas, &[]).expect_err("there is no file");
     assert!(matches!(error, GlbError::Maps { pages: 1, maps: 0 }));
 }
 
@@ -326,7 +389,15 @@ fn a_file_that_was_changed_is_refused() {
     std::fs::write(&path, &text).expect("it is written");
     let loaded = load(&path).expect("it loads");
     let atlas = atlas(&loaded.scene, 128);
-    let write = || glb(&loaded.scene, loaded.origin.as_ref(), &atlas, &maps(&atlas));
+    let write = || {
+        glb(
+            &loaded.scene,
+            loaded.origin.as_ref(),
+            None,
+            &atlas,
+            &maps(&atlas),
+        )
+    };
     assert!(write().is_ok());
     let mut document: Value = serde_json::from_str(&text).expect("a document");
     for node in document["nodes"].as_array_mut().expect("nodes") {

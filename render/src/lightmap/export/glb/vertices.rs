@@ -5,10 +5,34 @@
 //! that are written begin at multiples of four bytes. Cost: one copy.
 
 use super::document::{ARRAY_BUFFER, Document, ELEMENT_ARRAY_BUFFER, index, object_mut, set};
+use crate::lightmap::cut::Weights;
 use serde_json::{Value, json};
 
 /// Component type of f32.
 const FLOAT: usize = 5126;
+
+/// What the mean of an attribute is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mixing {
+    /// That of each component.
+    Components,
+    /// The same, of three components that keep their length; a fourth is a sign.
+    Direction,
+    /// There is none: the value of the vertex with the largest weight stands for it.
+    Largest,
+}
+
+impl Mixing {
+    /// Of an attribute with this name. Joints and features are numbers of things, and the weights of joints belong to them.
+    pub(super) fn of(attribute: &str) -> Self {
+        match attribute {
+            "NORMAL" | "TANGENT" => Self::Direction,
+            name if name.starts_with("TEXCOORD_") || name.starts_with("COLOR_") => Self::Components,
+            "POSITION" => Self::Components,
+            _ => Self::Largest,
+        }
+    }
+}
 
 /// Values of one attribute, packed without gaps.
 #[derive(Clone, Debug)]
@@ -73,21 +97,60 @@ impl Attribute {
         })
     }
 
-    /// Some of its items, by number.
+    /// Some of its items, by number, or means of several.
     ///
     /// # Panics
     /// When there are not so many.
-    pub(super) fn pick(&self, numbers: &[u32]) -> Self {
-        let mut data = Vec::with_capacity(numbers.len() * self.size);
-        for &number in numbers {
+    pub(super) fn pick(&self, numbers: &[Weights], mixing: Mixing) -> Self {
+        let item = |number: u32| {
             let start = number as usize * self.size;
-            data.extend_from_slice(&self.data[start..start + self.size]);
+            &self.data[start..start + self.size]
+        };
+        let mut data = Vec::with_capacity(numbers.len() * self.size);
+        for weights in numbers {
+            let mixed = Some(weights).filter(|weights| weights.len() > 1);
+            if let Some(mixed) = mixed.and_then(|weights| self.mix(weights, mixing)) {
+                data.extend_from_slice(&mixed);
+            } else if let Some(&(number, _)) = weights.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
+                data.extend_from_slice(item(number));
+            }
         }
         Self {
             accessor: self.accessor.clone(),
             size: self.size,
             data,
         }
+    }
+
+    /// The bytes of a mean of items; `None` where there is no mean.
+    fn mix(&self, weights: &Weights, mixing: Mixing) -> Option<Vec<u8>> {
+        let directions = match mixing {
+            Mixing::Largest => return None,
+            Mixing::Components => 0,
+            Mixing::Direction => 3,
+        };
+        let kind = index(&self.accessor, "componentType")?;
+        let width = component_size(kind)?;
+        let mut sums = vec![0.0; self.size / width];
+        for &(number, weight) in weights {
+            let start = number as usize * self.size;
+            let item = self.data[start..start + self.size].chunks_exact(width);
+            for (sum, bytes) in sums.iter_mut().zip(item) {
+                *sum += weight * component(kind, bytes)?;
+            }
+        }
+        if let Some(direction) = sums.get_mut(..directions) {
+            let item = &self.data[weights[0].0 as usize * self.size..];
+            let mut square = 0.0;
+            for bytes in item.chunks_exact(width).take(directions) {
+                square += component(kind, bytes)?.powi(2);
+            }
+            let length: f64 = direction.iter().map(|x| x * x).sum();
+            let scale = (square / length.max(f64::MIN_POSITIVE)).sqrt();
+            direction.iter_mut().for_each(|x| *x *= scale);
+        }
+        let bytes = sums.iter().map(|&sum| component_bytes(kind, sum));
+        Some(bytes.collect::<Option<Vec<_>>>()?.concat())
     }
 
     /// Adds it to a document as a view and an accessor of its own; `is_bounded` for positions, of which the format wants
@@ -211,6 +274,20 @@ fn component(kind: usize, bytes: &[u8]) -> Option<f64> {
         (5123, &[a, b]) => f64::from(u16::from_le_bytes([a, b])),
         (5125, &[a, b, c, d]) => f64::from(u32::from_le_bytes([a, b, c, d])),
         (FLOAT, &[a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
+        _ => return None,
+    })
+}
+
+/// The bytes of a component, rounded where they are those of an integer.
+fn component_bytes(kind: usize, value: f64) -> Option<Vec<u8>> {
+    let rounded = value.round();
+    Some(match kind {
+        5120 => (rounded as i8).to_le_bytes().to_vec(),
+        5121 => (rounded as u8).to_le_bytes().to_vec(),
+        5122 => (rounded as i16).to_le_bytes().to_vec(),
+        5123 => (rounded as u16).to_le_bytes().to_vec(),
+        5125 => (rounded as u32).to_le_bytes().to_vec(),
+        FLOAT => (value as f32).to_le_bytes().to_vec(),
         _ => return None,
     })
 }

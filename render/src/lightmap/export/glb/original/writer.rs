@@ -1,13 +1,15 @@
 //! Meshes of the scene's faces, with the attributes of the file.
 //!
 //! A node's mesh is made of the faces that the scene has: those without area or there twice are gone, strips and fans are triangles,
-//! and vertices stand once for each place in the atlas. All attributes and morph targets are copied as they are stored.
+//! and vertices stand once for each place in the atlas. All attributes and morph targets are copied as they are stored, and mixed where a
+//! face was cut.
 //! Faces of mirrored nodes turn as in the file. Primitives of points and lines stay.
 
 use super::{Groups, Materials, Node, Source};
+use crate::lightmap::cut::Weights;
 use crate::lightmap::export::glb::attach::{Mesh, Part, attach};
 use crate::lightmap::export::glb::document::{Document, items_mut, object_mut, set};
-use crate::lightmap::export::glb::vertices::{Attribute, write_indices};
+use crate::lightmap::export::glb::vertices::{Attribute, Mixing, write_indices};
 use crate::lightmap::export::glb::{Baked, GlbError, texture_sets};
 use luxel_scenes::{FaceId, MaterialId};
 use serde_json::{Map, Value};
@@ -121,7 +123,8 @@ fn write_primitive(
             name.clone()
         };
         let is_position = name == "POSITION";
-        let accessor = attribute.pick(&split.numbers).write(document, is_position);
+        let picked = attribute.pick(&split.numbers, Mixing::of(&name));
+        let accessor = picked.write(document, is_position);
         attributes.insert(name, accessor.into());
     }
     if let Some(places) = &split.places {
@@ -134,7 +137,7 @@ fn write_primitive(
     for target in &vertices.targets {
         let mut written = Map::new();
         for (name, attribute) in target {
-            let picked = attribute.pick(&split.numbers);
+            let picked = attribute.pick(&split.numbers, Mixing::Components);
             let accessor = picked.write(document, name == "POSITION");
             written.insert(name.clone(), accessor.into());
         }
@@ -160,8 +163,8 @@ fn write_primitive(
 /// The vertices that faces need: one for each vertex of the file and place in the atlas, in the order of the faces.
 struct Split {
     indices: Vec<u32>,
-    /// Their numbers in the file's accessors.
-    numbers: Vec<u32>,
+    /// Their numbers in the file's accessors, with the weights of those that they are made of.
+    numbers: Vec<Weights>,
     /// Their lightmap coordinates, where the faces have a lightmap.
     places: Option<Vec<[f32; 2]>>,
 }
@@ -171,20 +174,27 @@ impl Split {
         let Baked { scene, atlas, .. } = baked;
         let origin = source.run(run);
         let (mut indices, mut numbers, mut places) = (Vec::new(), Vec::new(), Vec::new());
-        let mut known: HashMap<(u32, [u32; 2]), u32> = HashMap::new();
+        let mut known: HashMap<(Vec<(u32, u64)>, [u32; 2]), u32> = HashMap::new();
         for face in faces {
             let mut corners: Vec<usize> = scene.faces[face.index()].corners().collect();
             if origin.is_mirrored {
                 // As the reader turned them: the first corner stays.
                 corners[1..].reverse();
             }
-            for corner in corners {
-                let number = scene.corners.vertex[corner] - origin.vertices.start;
+            // Faces that were cut have more than three corners.
+            let fan = (1..corners.len() - 1).flat_map(|next| [0, next, next + 1]);
+            for corner in fan.map(|number| corners[number]) {
+                let vertices = baked.vertices(corner);
+                let own = vertices.iter();
+                let number: Weights = own
+                    .map(|&(vertex, weight)| (vertex - origin.vertices.start, weight))
+                    .collect();
                 let place = match page {
                     Some(_) => atlas.uv(atlas.corners[corner]).as_vec2().to_array(),
                     None => [0.0; 2],
                 };
-                let key = (number, place.map(f32::to_bits));
+                let bits = number.iter().map(|&(n, weight)| (n, weight.to_bits()));
+                let key = (bits.collect(), place.map(f32::to_bits));
                 let vertex = *known.entry(key).or_insert_with(|| {
                     numbers.push(number);
                     places.push(place);

@@ -70,7 +70,7 @@ fn try_written(document: &Value, bytes: &[u8], pages: &[Option<u32>]) -> Result<
         charts: pages.iter().map(chart).collect(),
         padding: 1,
     };
-    glb(scene, loaded.origin.as_ref(), &atlas, &maps(&atlas))
+    glb(scene, loaded.origin.as_ref(), None, &atlas, &maps(&atlas))
 }
 
 fn written(document: &Value, bytes: &[u8], pages: &[Option<u32>]) -> (Value, Vec<u8>, Scene) {
@@ -183,6 +183,7 @@ fn a_second_bake_replaces_the_first() {
     let first = glb(
         &loaded.scene,
         loaded.origin.as_ref(),
+        None,
         &first_atlas,
         &maps(&first_atlas),
     );
@@ -191,7 +192,13 @@ fn a_second_bake_replaces_the_first() {
     std::fs::write(&path, first.expect("it is written")).expect("it is written");
     let loaded = load(&path).expect("it loads");
     let atlas = atlas(&loaded.scene, 256);
-    let second = glb(&loaded.scene, loaded.origin.as_ref(), &atlas, &maps(&atlas));
+    let second = glb(
+        &loaded.scene,
+        loaded.origin.as_ref(),
+        None,
+        &atlas,
+        &maps(&atlas),
+    );
     let second = second.expect("it is written");
     let again = reloaded("b.glb", &[("b.glb", &second)]).scene;
     assert_same_faces(&loaded.scene, &again, &atlas);
@@ -240,7 +247,7 @@ proptest! {
         std::fs::write(&path, text).expect("it is written");
         if let Ok(loaded) = load(&path) {
             let atlas = any_atlas(&loaded.scene);
-            let _ = glb(&loaded.scene, loaded.origin.as_ref(), &atlas, &maps(&atlas));
+            let _ = glb(&loaded.scene, loaded.origin.as_ref(), None, &atlas, &maps(&atlas));
         }
     }
 }
