@@ -1,6 +1,7 @@
 //! Bakes that are killed at any moment and go on to the same bytes, which needs processes of their own.
 
 use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -10,14 +11,7 @@ const KILLS: usize = 20;
 const CHAIN: usize = 4;
 
 /// Long enough for some rounds, short enough to be done again and again.
-const OPTIONS: [&str; 6] = [
-    "--size",
-    "64",
-    "--error",
-    "1%",
-    "--include",
-    "all,indirect",
-];
+const OPTIONS: [&str; 6] = ["--size", "64", "--error", "1%", "--include", "all,indirect"];
 
 fn scene() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/data/cornell/cornell.toml")
@@ -173,20 +167,29 @@ fn stopped_by_the_user_a_bake_can_go_on() {
     let bake = |folder: &Path, further: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_luxel"));
         command.arg("bake").arg(scene()).arg("-o").arg(folder);
-        command.args(["--size", "128", "--error", "0.4%", "--progress", "none"]);
+        command.args(["--size", "96", "--error", "0.4%"]);
         command.args(rarely).args(further).stderr(Stdio::piped());
         command
     };
-    let child = bake(&stopped, &[]).spawn().expect("it runs");
-    // Well within the gathering, which takes many seconds at this error.
-    std::thread::sleep(Duration::from_millis(2500));
+    let mut child = bake(&stopped, &["--progress", "json"])
+        .spawn()
+        .expect("it runs");
+    // Once receivers are gathered, which takes seconds at this error.
+    let mut told = BufReader::new(child.stderr.take().expect("a pipe"));
+    let mut message = String::new();
+    while !message.contains("gathering") {
+        assert!(
+            told.read_line(&mut message).expect("UTF-8") > 0,
+            "{message}"
+        );
+    }
     let signal = Command::new("kill")
         .args(["-INT", &child.id().to_string()])
         .status();
     assert!(signal.expect("kill runs").success());
-    let output = child.wait_with_output().expect("it ends");
-    let message = String::from_utf8(output.stderr).expect("UTF-8");
-    assert_eq!(output.status.code(), Some(130), "{message}");
+    told.read_to_string(&mut message).expect("UTF-8");
+    let status = child.wait().expect("it ends");
+    assert_eq!(status.code(), Some(130), "{message}");
     assert!(message.contains("--resume goes on from it"), "{message}");
     assert!(stopped.join("checkpoint.luxel").exists());
 
