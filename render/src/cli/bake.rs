@@ -3,17 +3,23 @@
 mod deliver;
 mod footprint;
 mod gathered;
+mod include;
+mod mask_files;
+mod masks;
+mod options;
 mod places;
 
 use super::exit::{ExitCode, Failure};
 use super::footprint::Footprint;
 use super::goal::Goal;
 use super::memory;
+use super::occlusion::Reach;
+use super::probe::Method;
+use super::reflections::Reflections;
 use super::scene;
 use super::stated::StatedError;
 use super::{Context, Session};
 use crate::files::OutputFolder;
-use crate::integrators::ao::Falloff;
 use crate::lightmap::atlas::Atlas;
 use crate::lightmap::bake::{self, Finished, Luxels, Smoothing};
 use crate::lightmap::manifest::{self, Manifest};
@@ -21,9 +27,12 @@ use crate::lightmap::target::Target;
 use clap::ValueEnum;
 use deliver::Delivery;
 use gathered::AtLuxels;
+use include::Include;
 use luxel_scenes::Scene;
+use luxel_solver::direct::{Lights, NamedLight};
 use luxel_solver::gather::Components;
 use luxel_solver::world::World;
+use masks::Masked;
 use std::path::PathBuf;
 
 /// Bake the light of a scene into textures
@@ -53,18 +62,15 @@ pub(super) struct Bake {
     )]
     include: Vec<Include>,
 
-    /// Of ambient occlusion: metres beyond which nothing occludes
-    #[arg(long, value_name = "D", value_parser = super::parse_length)]
-    max_distance: Option<f64>,
+    #[command(flatten)]
+    reach: Reach,
 
-    /// With --max-distance: how nearer blockers count
-    #[arg(
-        long,
-        value_name = "HOW",
-        requires = "max_distance",
-        default_value = "sharp"
-    )]
-    falloff: Falloff,
+    #[command(flatten)]
+    reflections: Reflections,
+
+    /// How light is computed; sky and masks have rays of their own [default: gather]
+    #[arg(long, value_enum, value_name = "HOW")]
+    integrator: Option<Method>,
 
     /// Where texture coordinates come from
     #[arg(long, value_enum, default_value = "auto", value_name = "WHENCE")]
@@ -104,36 +110,12 @@ enum Denoise {
     Builtin,
 }
 
-/// What is baked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Include {
-    /// All light
-    All,
-    /// Light straight from a source
-    Direct,
-    /// Light after at least one reflection
-    Indirect,
-    /// Ambient occlusion, 1 = open
-    Ao,
-}
-
-impl Include {
-    /// Which light; `None` for occlusion.
-    fn components(self) -> Option<Components> {
-        match self {
-            Self::All => Some(Components::All),
-            Self::Direct => Some(Components::Direct),
-            Self::Indirect => Some(Components::Indirect),
-            Self::Ao => None,
-        }
-    }
-}
-
 /// A finished bake.
 struct Baked {
     atlas: Atlas,
     luxels: Luxels,
     layers: Vec<Layer>,
+    masks: Vec<Masked>,
 }
 
 /// One set of maps.
@@ -146,6 +128,22 @@ struct Layer {
     /// Of light: where the flux goes, and patches of the solution.
     energy: Option<manifest::Energy>,
     patches: usize,
+}
+
+impl Baked {
+    /// Every set of maps by name, how wrong its luxels are, and what filtering leaves. Of masks the noisiest speaks for all.
+    fn stated(&self) -> Vec<(String, StatedError, f64)> {
+        let layers = self.layers.iter().map(|layer| {
+            let name = super::name(&layer.include);
+            (name, layer.stated.clone(), layer.error.filtering)
+        });
+        let noisiest = |a: &&Masked, b: &&Masked| a.stated.total().total_cmp(&b.stated.total());
+        let masks = self.masks.iter().max_by(noisiest).map(|masked| {
+            let name = super::name(&Include::Masks);
+            (name, masked.stated.clone(), masked.error.filtering)
+        });
+        layers.chain(masks).collect()
+    }
 }
 
 impl Bake {
@@ -162,7 +160,9 @@ impl Bake {
             if self.include.iter().any(|include| *include != Include::Ao) {
                 scene::require_light(&world)?;
             }
-            let Some(baked) = self.bake(&world, &goal, context)? else {
+            let masked = self.masked(&world);
+            self.check_lights(&world, &masked)?;
+            let Some(baked) = self.bake(&world, masked, &goal, context)? else {
                 return Ok(None);
             };
             let delivery = Delivery {
@@ -171,18 +171,20 @@ impl Bake {
                 origin: loaded.origin.as_ref(),
                 baked: &baked,
                 target: self.target,
+                bounces: self.reflections.bounces(),
                 seed: context.common.seed,
             };
             let manifest = delivery.write()?;
-            Ok::<_, Failure>(Some((manifest, baked.layers)))
+            let stated = baked.stated();
+            Ok::<_, Failure>(Some((manifest, stated)))
         })??;
-        let Some((manifest, layers)) = delivered else {
+        let Some((manifest, stated)) = delivered else {
             return Ok(ExitCode::Interrupted);
         };
-        self.report(&manifest, &layers, &goal, session)?;
-        let missed = layers
+        self.report(&manifest, &stated, &goal, session)?;
+        let missed = stated
             .iter()
-            .map(|layer| layer.stated.exit(Some(&goal)))
+            .map(|(_, stated, _)| stated.exit(Some(&goal)))
             .find(|exit| *exit != ExitCode::Ok);
         Ok(if session.context.interrupt.is_set() {
             ExitCode::Interrupted
@@ -191,37 +193,21 @@ impl Bake {
         })
     }
 
-    /// Refuses options that would have no effect.
-    fn check_options(&self) -> Result<(), Failure> {
-        let mut kinds = self.include.clone();
-        kinds.sort_by_key(|include| *include as u8);
-        kinds.dedup();
-        let problem = if self.max_distance.is_some() && !self.include.contains(&Include::Ao) {
-            "--max-distance belongs to --include ao"
-        } else if kinds.len() < self.include.len() {
-            "--include names the same twice"
-        } else {
-            return Ok(());
-        };
-        Err(Failure::new(ExitCode::Usage, problem))
-    }
-
     /// Tells what was delivered, and how right it is.
     fn report(
         &self,
         manifest: &Manifest,
-        layers: &[Layer],
+        stated: &[(String, StatedError, f64)],
         goal: &Goal,
         session: &mut Session<'_>,
     ) -> Result<(), Failure> {
         let context = &session.context;
         let seconds = context.started.elapsed().as_secs_f64();
-        for layer in layers {
+        for (name, stated, filtering) in stated {
             context.reporter.note(format_args!(
-                "{}: {}; between texels filtering leaves {:.2} %",
-                super::name(&layer.include),
-                layer.stated.summary(Some(goal)),
-                100.0 * layer.error.filtering,
+                "{name}: {}; between texels filtering leaves {:.2} %",
+                stated.summary(Some(goal)),
+                100.0 * filtering,
             ));
         }
         context.reporter.note(format_args!(
@@ -242,14 +228,9 @@ impl Bake {
         let text = if context.common.json {
             let mut json = serde_json::to_value(manifest)?;
             json["seconds"] = seconds.into();
-            json["stated"] = layers
+            json["stated"] = stated
                 .iter()
-                .map(|layer| {
-                    (
-                        super::name(&layer.include),
-                        layer.stated.to_json(Some(goal)),
-                    )
-                })
+                .map(|(name, stated, _)| (name.clone(), stated.to_json(Some(goal))))
                 .collect::<serde_json::Map<_, _>>()
                 .into();
             memory::add_peak(&mut json);
@@ -264,16 +245,17 @@ impl Bake {
     fn bake(
         &self,
         world: &World<'_>,
+        masked: Vec<NamedLight>,
         goal: &Goal,
         context: &Context<'_>,
     ) -> Result<Option<Baked>, Failure> {
         let atlas = self.places(world, context)?;
         // At least the texels that faces cover: what does not fit then is refused before luxels are looked for.
         let covered: f64 = atlas.object_texels(world.scene()).iter().sum();
-        self.require_memory(world, &atlas, covered as usize, goal, context)?;
+        self.require_memory(world, &atlas, covered as usize, masked.len(), goal, context)?;
         let luxels = Luxels::new(world, &atlas, self.backface_tolerance);
         let count = luxels.lit.luxels.len();
-        let held = self.require_memory(world, &atlas, count, goal, context)?;
+        let held = self.require_memory(world, &atlas, count, masked.len(), goal, context)?;
         if luxels.lit.luxels.is_empty() {
             return Err(Failure::new(
                 ExitCode::NothingToDo,
@@ -285,20 +267,56 @@ impl Bake {
         }
         let mut layers = Vec::new();
         for &include in &self.include {
-            let gathered = match include.components() {
-                Some(components) => self.light(world, &luxels, components, &held, goal, context)?,
-                None => self.occlusion(world, &luxels, goal, context),
+            let gathered = match (include, include.components()) {
+                (_, Some(components)) if self.is_traced() => {
+                    self.traced(world, &luxels, components, goal, context)
+                }
+                (_, Some(components)) => {
+                    self.light(world, &luxels, components, &held, goal, context)?
+                }
+                (Include::Ao, _) => self.occlusion(world, &luxels, goal, context),
+                (Include::Masks, _) => continue,
+                _ => {
+                    let sky = world.lit_by(Lights::sky_of(world.scene()));
+                    self.light(&sky, &luxels, Components::Direct, &held, goal, context)?
+                }
             };
             let Some(gathered) = gathered else {
                 return Ok(None);
             };
             layers.push(self.layer(world, &atlas, &luxels, include, gathered));
         }
+        let Some(masks) = self.masks(world, &atlas, &luxels, masked, goal, context)? else {
+            return Ok(None);
+        };
         Ok(Some(Baked {
             atlas,
             luxels,
             layers,
+            masks,
         }))
+    }
+
+    /// The lights whose masks are asked for.
+    fn masked(&self, world: &World<'_>) -> Vec<NamedLight> {
+        if self.include.contains(&Include::Masks) {
+            world.lights().named(world.scene())
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// Whether light is computed by paths.
+    fn is_traced(&self) -> bool {
+        self.integrator == Some(Method::Path)
+    }
+
+    /// What is done about noise.
+    fn smoothing(&self) -> Smoothing {
+        match self.denoise {
+            Denoise::None => Smoothing::None,
+            Denoise::Builtin => Smoothing::NonLocalMeans,
+        }
     }
 
     /// Makes maps of what was gathered.
@@ -310,11 +328,8 @@ impl Bake {
         include: Include,
         gathered: AtLuxels,
     ) -> Layer {
-        let smoothing = match self.denoise {
-            Denoise::None => Smoothing::None,
-            Denoise::Builtin => Smoothing::NonLocalMeans,
-        };
-        let maps = bake::finish(world.scene(), atlas, luxels, &gathered.values, smoothing);
+        let scene = world.scene();
+        let maps = bake::finish(scene, atlas, luxels, &gathered.values, self.smoothing());
         let [of_luxels, total] = [&maps.raw, &maps.map].map(bake::relative_error);
         Layer {
             include,

@@ -47,6 +47,7 @@ fn run(error: f64, left: usize) -> (Adaptive, usize) {
     let config = AdaptiveConfig {
         error,
         components: Components::All,
+        bounces: Bounces::All,
         most_patches: usize::MAX,
         seed: 1,
     };
@@ -124,6 +125,7 @@ fn many_receivers_share_few_rays_and_are_right() {
         let config = AdaptiveConfig {
             error,
             components: Components::All,
+            bounces: Bounces::All,
             most_patches: usize::MAX,
             seed,
         };
@@ -152,7 +154,7 @@ fn a_field_is_as_exact_as_it_says() {
     let scene = generate::cornell_box();
     let world = World::new(&scene);
     let receivers = on_the_floor(&world, 64);
-    let adapted = Adapted::new(&world, 1).expect("a scene");
+    let adapted = Adapted::new(&world, Bounces::All, 1).expect("a scene");
     let lookup = adapted.solve(2000, &mut unlimited(0.0)).expect("a scene");
     let lookup = lookup.expect("nothing stops it");
     let weights = vec![luxel_scenes::Rgb::ONE; receivers.len()];
@@ -203,6 +205,7 @@ fn joined_receivers_are_the_same_at_any_number_of_threads() {
     let config = AdaptiveConfig {
         error: 0.1,
         components: Components::All,
+        bounces: Bounces::All,
         most_patches: usize::MAX,
         seed: 4,
     };
@@ -226,6 +229,7 @@ fn a_mesh_that_may_not_grow_is_the_reason() {
     let config = AdaptiveConfig {
         error: 0.0005,
         components: Components::All,
+        bounces: Bounces::All,
         most_patches: 400,
         seed: 1,
     };
