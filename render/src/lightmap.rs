@@ -18,6 +18,7 @@ pub mod lookup;
 pub mod luxels;
 pub mod manifest;
 pub mod map;
+pub mod masks;
 pub mod page;
 pub mod picture;
 pub mod receivers;

@@ -171,6 +171,26 @@ fn pictures_hold_what_is_expected() {
     );
 }
 
+#[test]
+fn bakes_hold_what_is_expected() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().to_str().expect("UTF-8");
+    let (cornell, pavilion) = (scene("cornell"), scene("pavilion"));
+    let bake = |scene: &str, options: &str| {
+        let words: Vec<&str> = options.split(' ').collect();
+        is_expected(&[&["bake", scene, "-o", out], &words[..]].concat());
+    };
+    bake(&cornell, "--size 512 --error 10%");
+    bake(&cornell, "--size 512 --error 30% --include direct,masks");
+    bake(&cornell, "--size 512 --include ao,direct --error 20%");
+    bake(&cornell, "--size 256 --error 4% --bounces 6");
+    bake(&cornell, "--size 256 --error 90% --integrator path");
+    bake(
+        &pavilion,
+        "--size 256 --error 20% --include all,direct,indirect",
+    );
+}
+
 /// Asserts that a run is refused for want of memory, and that what its message says would fit does.
 #[track_caller]
 fn suggestion_fits(arguments: &[&str], option: &str) {
@@ -207,6 +227,8 @@ fn what_is_suggested_fits() {
     let dense = "solve --form-factors raycast --rays 64";
     refused(&format!("{dense} --patch-size 0.01"), "24M", "--patch-size");
     refused(dense, "24M", "--patch-size");
+    let bake = "bake -o OUT --error 20% --size 1024";
+    refused(bake, "300M", "--size");
     let ao = "render -o OUT --integrator ao --spp 1 --size 1000x300";
     refused(ao, "24M", "--size");
 }

@@ -18,6 +18,8 @@ pub mod form_factors;
 
 pub mod transport;
 
+pub mod bounces;
+
 pub mod solvers;
 
 pub mod direct;

@@ -7,11 +7,12 @@ use crate::patches::{Density, MeshError, PatchId, PatchSize, Patches, Side};
 use crate::surface::{SurfacePoint, Surfaces};
 use glam::{DVec3, Vec3};
 use luxel_scenes::{FaceId, Scene};
+use std::sync::Arc;
 
 /// Everything that rays and lights need to know of a scene.
 pub struct World<'s> {
-    surfaces: Surfaces<'s>,
-    bvh: Bvh,
+    surfaces: Arc<Surfaces<'s>>,
+    bvh: Arc<Bvh>,
     lights: Lights,
 }
 
@@ -50,8 +51,18 @@ impl<'s> World<'s> {
         let bvh = Bvh::build(surfaces.geometry());
         let lights = Lights::new(&surfaces);
         Self {
-            surfaces,
-            bvh,
+            surfaces: Arc::new(surfaces),
+            bvh: Arc::new(bvh),
+            lights,
+        }
+    }
+
+    /// The same surfaces in the light of `lights`, which are some of its own: for direct light from them alone.
+    #[must_use]
+    pub fn lit_by(&self, lights: Lights) -> Self {
+        Self {
+            surfaces: Arc::clone(&self.surfaces),
+            bvh: Arc::clone(&self.bvh),
             lights,
         }
     }

@@ -6,7 +6,8 @@ use luxel::lightmap::bake::{Finished, Luxels, Smoothing, bake, finish};
 use luxel::lightmap::unwrap::{Density, UnwrapConfig, Unwrapper, UvUnwrap};
 use luxel_scenes::{Material, Reflectance, Scene};
 use luxel_solver::adaptive::{AdaptiveConfig, Control, Stage};
-use luxel_solver::gather::{Components, ErrorParts};
+use luxel_solver::bounces::Bounces;
+use luxel_solver::gather::{Components, ErrorParts, Gathered};
 use luxel_solver::world::World;
 use std::f64::consts::TAU;
 
@@ -39,29 +40,53 @@ impl Control for Until {
     }
 }
 
+/// The faces of a scene on one page of `side` texels.
+///
+/// # Panics
+/// When it cannot be unwrapped.
+pub fn atlas(scene: &Scene, side: usize) -> Atlas {
+    let config = UnwrapConfig {
+        density: Density::Page(side),
+        padding: 1,
+        block_align: false,
+    };
+    UvUnwrap
+        .unwrap(scene, &[], &config, &|_, _| true)
+        .expect("an atlas")
+}
+
+/// What is gathered at luxels in the light of `world`, to a relative error.
+///
+/// # Panics
+/// When the scene cannot be meshed.
+pub fn gathered(
+    world: &World<'_>,
+    luxels: &Luxels,
+    components: Components,
+    bounces: Bounces,
+    error: f64,
+    seed: u64,
+) -> Vec<Gathered> {
+    let config = AdaptiveConfig {
+        error,
+        components,
+        bounces,
+        most_patches: usize::MAX,
+        seed,
+    };
+    let found = bake(world, luxels, &config, None, &mut Until(error)).expect("a mesh");
+    found.expect("nobody stops it").gathered
+}
+
 /// Bakes a scene on one page of `side` texels to a relative error, smoothed.
 ///
 /// # Panics
 /// When it cannot be unwrapped or meshed.
 pub fn baked(scene: &Scene, side: usize, error: f64) -> Baked<'_> {
     let world = World::new(scene);
-    let config = UnwrapConfig {
-        density: Density::Page(side),
-        padding: 1,
-        block_align: false,
-    };
-    let atlas = UvUnwrap
-        .unwrap(scene, &[], &config, &|_, _| true)
-        .expect("an atlas");
+    let atlas = atlas(scene, side);
     let luxels = Luxels::new(&world, &atlas, 0.5);
-    let config = AdaptiveConfig {
-        error,
-        components: Components::All,
-        most_patches: usize::MAX,
-        seed: 0,
-    };
-    let found = bake(&world, &luxels, &config, None, &mut Until(error)).expect("a mesh");
-    let gathered = found.expect("nobody stops it").gathered;
+    let gathered = gathered(&world, &luxels, Components::All, Bounces::All, error, 0);
     let maps = finish(&world, &atlas, &luxels, &gathered, Smoothing::NonLocalMeans);
     Baked {
         world,

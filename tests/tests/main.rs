@@ -14,6 +14,7 @@ mod hemicube;
 mod honesty;
 mod irradiance_fields;
 mod leaks;
+mod lightmap_contents;
 mod lightmaps;
 mod ray_cast;
 mod references;

@@ -3,6 +3,10 @@
 mod deliver;
 mod footprint;
 mod gathered;
+mod include;
+mod mask_files;
+mod masks;
+mod options;
 mod places;
 
 use super::checkpoint::{AtLuxels, Keeper, Options, Resume};
@@ -11,11 +15,13 @@ use super::footprint::Footprint;
 use super::goal::Goal;
 use super::interrupt::Listening;
 use super::memory;
+use super::occlusion::Reach;
+use super::probe::Method;
+use super::reflections::Reflections;
 use super::scene;
 use super::stated::StatedError;
 use super::{Context, Session};
 use crate::files::OutputFolder;
-use crate::integrators::ao::Falloff;
 use crate::lightmap::atlas::Atlas;
 use crate::lightmap::bake::{self, Finished, Luxels, Smoothing};
 use crate::lightmap::cut::{self, CutScene};
@@ -24,9 +30,12 @@ use crate::lightmap::target::Target;
 use crate::lightmap::walls;
 use clap::ValueEnum;
 use deliver::Delivery;
+use include::Include;
 use luxel_scenes::Scene;
+use luxel_solver::direct::{Lights, NamedLight};
 use luxel_solver::gather::Components;
 use luxel_solver::world::World;
+use masks::Masked;
 use places::Charts;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -72,18 +81,17 @@ pub(super) struct Bake {
     )]
     include: Vec<Include>,
 
-    /// Of ambient occlusion: metres beyond which nothing occludes
-    #[arg(long, value_name = "D", value_parser = super::parse_length)]
-    max_distance: Option<f64>,
+    #[command(flatten)]
+    #[serde(flatten)]
+    reach: Reach,
 
-    /// With --max-distance: how nearer blockers count
-    #[arg(
-        long,
-        value_name = "HOW",
-        requires = "max_distance",
-        default_value = "sharp"
-    )]
-    falloff: Falloff,
+    #[command(flatten)]
+    #[serde(flatten)]
+    reflections: Reflections,
+
+    /// How light is computed; sky and masks have rays of their own [default: gather]
+    #[arg(long, value_enum, value_name = "HOW")]
+    integrator: Option<Method>,
 
     /// Where texture coordinates come from
     #[arg(long, value_enum, default_value = "auto", value_name = "WHENCE")]
@@ -124,32 +132,6 @@ enum Denoise {
     Builtin,
 }
 
-/// What is baked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
-enum Include {
-    /// All light
-    All,
-    /// Light straight from a source
-    Direct,
-    /// Light after at least one reflection
-    Indirect,
-    /// Ambient occlusion, 1 = open
-    Ao,
-}
-
-impl Include {
-    /// Which light; `None` for occlusion.
-    fn components(self) -> Option<Components> {
-        match self {
-            Self::All => Some(Components::All),
-            Self::Direct => Some(Components::Direct),
-            Self::Indirect => Some(Components::Indirect),
-            Self::Ao => None,
-        }
-    }
-}
-
 /// Where a scene is to be lit.
 struct Placed {
     atlas: Atlas,
@@ -174,6 +156,7 @@ struct Baked {
     atlas: Atlas,
     luxels: Luxels,
     layers: Vec<Layer>,
+    masks: Vec<Masked>,
     /// What was gathered is delivered: only a second wish to stop ends that.
     _listening: Listening,
 }
@@ -188,6 +171,22 @@ struct Layer {
     /// Of light: where the flux goes, and patches of the solution.
     energy: Option<manifest::Energy>,
     patches: usize,
+}
+
+impl Baked {
+    /// Every set of maps by name, how wrong its luxels are, and what filtering leaves. Of masks the noisiest speaks for all.
+    fn stated(&self) -> Vec<(String, StatedError, f64)> {
+        let layers = self.layers.iter().map(|layer| {
+            let name = super::name(&layer.include);
+            (name, layer.stated.clone(), layer.error.filtering)
+        });
+        let noisiest = |a: &&Masked, b: &&Masked| a.stated.total().total_cmp(&b.stated.total());
+        let masks = self.masks.iter().max_by(noisiest).map(|masked| {
+            let name = super::name(&Include::Masks);
+            (name, masked.stated.clone(), masked.error.filtering)
+        });
+        layers.chain(masks).collect()
+    }
 }
 
 impl Bake {
@@ -213,15 +212,18 @@ impl Bake {
             if self.include.iter().any(|include| *include != Include::Ao) {
                 scene::require_light(&world)?;
             }
-            let mut placed = self.place(&world, &[], &goal, context)?;
+            let masked = self.masked(&world);
+            self.check_lights(&world, &masked)?;
+            let mut placed = self.place(&world, &[], masked.len(), &goal, context)?;
             let mut corners = None;
             if let Some(found) = placed.cut(&world) {
                 cut = found;
                 world = World::new(&cut.scene);
-                placed = self.place(&world, &cut.edges, &goal, context)?;
+                placed = self.place(&world, &cut.edges, masked.len(), &goal, context)?;
                 corners = Some(cut.corners.as_slice());
             }
-            let Some(baked) = self.bake(&world, placed, &goal, &keeper, context)? else {
+            let masked = self.masked(&world);
+            let Some(baked) = self.bake(&world, placed, masked, &goal, &keeper, context)? else {
                 keeper.tell();
                 return Ok(None);
             };
@@ -233,6 +235,7 @@ impl Bake {
                 corners,
                 baked: &baked,
                 target: self.target,
+                bounces: self.reflections.bounces(),
                 seed: context.common.seed,
             };
             let manifest = delivery.write()?;
@@ -241,15 +244,16 @@ impl Bake {
             } else {
                 keeper.finish()?;
             }
-            Ok::<_, Failure>(Some((manifest, baked.layers)))
+            let stated = baked.stated();
+            Ok::<_, Failure>(Some((manifest, stated)))
         })??;
-        let Some((manifest, layers)) = delivered else {
+        let Some((manifest, stated)) = delivered else {
             return Ok(ExitCode::Interrupted);
         };
-        self.report(&manifest, &layers, &goal, session)?;
-        let missed = layers
+        self.report(&manifest, &stated, &goal, session)?;
+        let missed = stated
             .iter()
-            .map(|layer| layer.stated.exit(Some(&goal)))
+            .map(|(_, stated, _)| stated.exit(Some(&goal)))
             .find(|exit| *exit != ExitCode::Ok);
         Ok(if session.context.interrupt.is_set() {
             ExitCode::Interrupted
@@ -258,37 +262,21 @@ impl Bake {
         })
     }
 
-    /// Refuses options that would have no effect.
-    fn check_options(&self) -> Result<(), Failure> {
-        let mut kinds = self.include.clone();
-        kinds.sort_by_key(|include| *include as u8);
-        kinds.dedup();
-        let problem = if self.max_distance.is_some() && !self.include.contains(&Include::Ao) {
-            "--max-distance belongs to --include ao"
-        } else if kinds.len() < self.include.len() {
-            "--include names the same twice"
-        } else {
-            return Ok(());
-        };
-        Err(Failure::new(ExitCode::Usage, problem))
-    }
-
     /// Tells what was delivered, and how right it is.
     fn report(
         &self,
         manifest: &Manifest,
-        layers: &[Layer],
+        stated: &[(String, StatedError, f64)],
         goal: &Goal,
         session: &mut Session<'_>,
     ) -> Result<(), Failure> {
         let context = &session.context;
         let seconds = context.started.elapsed().as_secs_f64();
-        for layer in layers {
+        for (name, stated, filtering) in stated {
             context.reporter.note(format_args!(
-                "{}: {}; between texels filtering leaves {:.2} %",
-                super::name(&layer.include),
-                layer.stated.summary(Some(goal)),
-                100.0 * layer.error.filtering,
+                "{name}: {}; between texels filtering leaves {:.2} %",
+                stated.summary(Some(goal)),
+                100.0 * filtering,
             ));
         }
         context.reporter.note(format_args!(
@@ -309,14 +297,9 @@ impl Bake {
         let text = if context.common.json {
             let mut json = serde_json::to_value(manifest)?;
             json["seconds"] = seconds.into();
-            json["stated"] = layers
+            json["stated"] = stated
                 .iter()
-                .map(|layer| {
-                    (
-                        super::name(&layer.include),
-                        layer.stated.to_json(Some(goal)),
-                    )
-                })
+                .map(|(name, stated, _)| (name.clone(), stated.to_json(Some(goal))))
                 .collect::<serde_json::Map<_, _>>()
                 .into();
             memory::add_peak(&mut json);
@@ -332,16 +315,17 @@ impl Bake {
         &self,
         world: &World<'_>,
         cuts: &[bool],
+        masked: usize,
         goal: &Goal,
         context: &Context<'_>,
     ) -> Result<Placed, Failure> {
         let (atlas, charts) = self.places(world, cuts, context)?;
         // At least the texels that faces cover: what does not fit then is refused before luxels are looked for.
         let covered: f64 = atlas.object_texels(world.scene()).iter().sum();
-        self.require_memory(world, &atlas, covered as usize, goal, context)?;
+        self.require_memory(world, &atlas, covered as usize, masked, goal, context)?;
         let luxels = Luxels::new(world, &atlas, self.backface_tolerance);
         let count = luxels.lit.luxels.len();
-        let held = self.require_memory(world, &atlas, count, goal, context)?;
+        let held = self.require_memory(world, &atlas, count, masked, goal, context)?;
         if luxels.lit.luxels.is_empty() {
             return Err(Failure::new(
                 ExitCode::NothingToDo,
@@ -364,6 +348,7 @@ impl Bake {
         &self,
         world: &World<'_>,
         placed: Placed,
+        masked: Vec<NamedLight>,
         goal: &Goal,
         keeper: &Keeper<'_, 'r>,
         context: &Context<'r>,
@@ -376,29 +361,65 @@ impl Bake {
         } = placed;
         let listening = context.interrupt.listen();
         let mut layers = Vec::new();
-        for (index, &include) in self.include.iter().enumerate() {
-            let gathered = match (keeper.complete(index), include.components()) {
-                (Some(complete), _) => Some(complete),
-                (None, Some(components)) => {
+        for &include in &self.include {
+            let known = keeper.complete(layers.len());
+            let gathered = match (known, include, include.components()) {
+                (_, Include::Masks, _) => continue,
+                (Some(complete), ..) => Some(complete),
+                (None, _, Some(components)) if self.is_traced() => {
+                    self.traced(world, &luxels, components, goal, keeper, context)
+                }
+                (None, _, Some(components)) => {
                     self.light(world, &luxels, components, &held, goal, keeper, context)?
                 }
-                (None, None) => self.occlusion(world, &luxels, goal, keeper, context),
+                (None, Include::Ao, _) => self.occlusion(world, &luxels, goal, keeper, context),
+                (None, ..) => {
+                    let sky = world.lit_by(Lights::sky_of(world.scene()));
+                    let components = Components::Direct;
+                    self.light(&sky, &luxels, components, &held, goal, keeper, context)?
+                }
             };
             let Some(gathered) = gathered else {
                 return Ok(None);
             };
             layers.push(self.layer(world, &atlas, &luxels, include, &gathered));
-            let is_last = index + 1 == self.include.len();
+            let is_last = layers.len() == self.include.len();
             if !is_last && !context.interrupt.is_set() {
-                keeper.add(index, gathered);
+                keeper.add(layers.len() - 1, gathered);
             }
         }
+        let Some(masks) = self.masks(world, &atlas, &luxels, masked, goal, context)? else {
+            return Ok(None);
+        };
         Ok(Some(Baked {
             atlas,
             luxels,
             layers,
+            masks,
             _listening: listening,
         }))
+    }
+
+    /// The lights whose masks are asked for.
+    fn masked(&self, world: &World<'_>) -> Vec<NamedLight> {
+        if self.include.contains(&Include::Masks) {
+            world.lights().named(world.scene())
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// Whether light is computed by paths.
+    fn is_traced(&self) -> bool {
+        self.integrator == Some(Method::Path)
+    }
+
+    /// What is done about noise.
+    fn smoothing(&self) -> Smoothing {
+        match self.denoise {
+            Denoise::None => Smoothing::None,
+            Denoise::Builtin => Smoothing::NonLocalMeans,
+        }
     }
 
     /// Makes maps of what was gathered.
@@ -410,11 +431,7 @@ impl Bake {
         include: Include,
         gathered: &AtLuxels,
     ) -> Layer {
-        let smoothing = match self.denoise {
-            Denoise::None => Smoothing::None,
-            Denoise::Builtin => Smoothing::NonLocalMeans,
-        };
-        let maps = bake::finish(world, atlas, luxels, &gathered.values, smoothing);
+        let maps = bake::finish(world, atlas, luxels, &gathered.values, self.smoothing());
         let [of_luxels, total] = [&maps.raw, &maps.map].map(bake::relative_error);
         Layer {
             include,

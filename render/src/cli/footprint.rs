@@ -8,6 +8,7 @@ use super::exit::{ExitCode, Failure};
 use super::memory::{Bytes, MemoryLimit, as_option};
 use luxel_scenes::Scene;
 use luxel_solver::adaptive;
+use luxel_solver::bounces::Bounces;
 use luxel_solver::patches::MAX_PATCHES;
 use luxel_solver::world::World;
 
@@ -62,13 +63,22 @@ impl Footprint {
 
     /// Patches of the finest mesh that a result with this footprint may be refined to after one of `first` patches, at
     /// least as many.
-    pub(super) fn most_patches(&self, scene: &Scene, first: usize, context: &Context<'_>) -> usize {
+    pub(super) fn most_patches(
+        &self,
+        scene: &Scene,
+        first: usize,
+        bounces: Bounces,
+        context: &Context<'_>,
+    ) -> usize {
         let Some(limit) = context.common.max_memory else {
             return usize::MAX;
         };
         let fits = |patches| {
-            self.with("patches", adaptive::bytes_to_refine(patches, scene))
-                .fits(Some(limit))
+            self.with(
+                "patches",
+                adaptive::bytes_to_refine(patches, bounces, scene),
+            )
+            .fits(Some(limit))
         };
         largest(first, MAX_PATCHES, fits).unwrap_or(first)
     }

@@ -44,6 +44,14 @@ impl Goal {
         }
     }
 
+    /// The same with another error to reach, where there is one.
+    pub(super) fn with_error(&self, error: f64) -> Self {
+        Self {
+            error: self.error.map(|_| RelativeError(error)),
+            ..*self
+        }
+    }
+
     /// Whether an estimated relative error is what was asked for. False for `NaN`, and without an
     /// error to reach.
     pub(super) fn is_met_by(&self, estimate: f64) -> bool {

@@ -4,14 +4,16 @@ use super::exit::{ExitCode, Failure};
 use super::footprint::{Footprint, held_back, larger_error, largest};
 use super::goal::Goal;
 use super::memory;
+use super::occlusion::Reach;
 use super::refine::{Refined, refine};
+use super::reflections::{Reflected, Reflections};
 use super::scene;
 use super::stated::StatedError;
 use super::steering::{Steering, first_error};
 use super::{Context, Session};
 use crate::files::Output;
 use crate::film::{Alike, Film};
-use crate::integrators::ao::{AmbientOcclusion, Config, Falloff};
+use crate::integrators::ao::AmbientOcclusion;
 use crate::integrators::path::PathTracer;
 use crate::points::{Estimate, PointTable};
 use crate::progress::Progress;
@@ -74,18 +76,11 @@ pub(super) struct Probe {
     #[arg(long, value_enum, value_name = "HOW")]
     integrator: Option<Method>,
 
-    /// With --quantity ao: metres beyond which nothing occludes
-    #[arg(long, value_name = "D", value_parser = super::parse_length)]
-    max_distance: Option<f64>,
+    #[command(flatten)]
+    reach: Reach,
 
-    /// With --max-distance: how nearer blockers count
-    #[arg(
-        long,
-        value_name = "HOW",
-        requires = "max_distance",
-        default_value = "sharp"
-    )]
-    falloff: Falloff,
+    #[command(flatten)]
+    reflections: Reflections,
 
     /// Rays for each point, whatever the error [default: as many as the error asks for]
     #[arg(long, conflicts_with_all = ["error", "time"], value_name = "N", value_parser = clap::value_parser!(u32).range(4..=1 << 28))]
@@ -113,8 +108,9 @@ enum Component {
 }
 
 /// How irradiance is computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Method {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Method {
     /// Direct light exact, indirect light gathered from a radiosity solution
     Gather,
     /// Unbiased path tracing: the reference
@@ -211,10 +207,14 @@ impl Probe {
             "--components belongs to --quantity irradiance"
         } else if ao && self.integrator.is_some() {
             "--integrator belongs to --quantity irradiance"
-        } else if !ao && self.max_distance.is_some() {
-            "--max-distance belongs to --quantity ao"
         } else {
-            return Ok(());
+            self.reach.require(ao, "--quantity ao")?;
+            return self.reflections.require(match self.components {
+                _ if ao => Reflected::None("--quantity irradiance"),
+                Some(Component::Direct) => Reflected::None("--components all or indirect"),
+                Some(Component::Indirect) => Reflected::Alone,
+                Some(Component::All) | None => Reflected::Some,
+            });
         };
         Err(Failure::new(ExitCode::Usage, problem))
     }
@@ -241,6 +241,7 @@ impl Probe {
     fn first_patches(&self, error: f64, rays: Option<u32>) -> usize {
         match rays {
             _ if !self.gathers() || self.components == Some(Component::Direct) => 0,
+            _ if !self.reflections.bounces().reflect() => 0,
             Some(rays) => patches_for(rays),
             None => adaptive::first_patches(error),
         }
@@ -256,7 +257,8 @@ impl Probe {
     ) -> Result<Footprint, Failure> {
         let listed = context.common.json && self.output.is_none();
         let with_mesh = |points: usize, patches: usize| {
-            let solving = adaptive::bytes_to_solve(patches, world.scene());
+            let solving =
+                adaptive::bytes_to_solve(patches, self.reflections.bounces(), world.scene());
             let solving = if patches > 0 { solving } else { 0 };
             self.footprint(world, points, listed)
                 .with("patches and their solutions", solving)
@@ -288,12 +290,7 @@ impl Probe {
     ) -> Result<Option<Found>, Failure> {
         let seed = context.common.seed;
         if self.quantity == Quantity::Ao {
-            let config = Config {
-                rays: AO_RAYS,
-                max_distance: self.max_distance,
-                falloff: self.falloff,
-                seed,
-            };
+            let config = self.reach.config(AO_RAYS, seed);
             let occlusion = AmbientOcclusion::new(world, config);
             let add = |film: &mut Film, samples: &[u32], progress: &dyn Progress| {
                 occlusion.at_receivers(film, receivers, samples, progress);
@@ -304,7 +301,7 @@ impl Probe {
         let components = self.components.unwrap_or(Component::All).into();
         match self.integrator.unwrap_or(Method::Gather) {
             Method::Path => {
-                let tracer = PathTracer::new(world, seed);
+                let tracer = PathTracer::new(world, seed).with_bounces(self.reflections.bounces());
                 let add = |film: &mut Film, samples: &[u32], progress: &dyn Progress| {
                     tracer.irradiance(film, receivers, components, samples, progress);
                 };
@@ -362,10 +359,12 @@ impl Probe {
         let mut steering = Steering::new(context, goal);
         let error = first_error(goal);
         let first = self.first_patches(error, self.rays);
+        let bounces = self.reflections.bounces();
         let config = AdaptiveConfig {
             error,
             components,
-            most_patches: held.most_patches(world.scene(), first, context),
+            bounces,
+            most_patches: held.most_patches(world.scene(), first, bounces, context),
             seed: context.common.seed,
         };
         let found = match self.rays {

@@ -7,7 +7,9 @@ use super::exit::{ExitCode, Failure};
 use super::footprint::{Footprint, held_back};
 use super::goal::Goal;
 use super::memory;
+use super::occlusion::Reach;
 use super::refine::{Refined, refine};
+use super::reflections::{Reflected, Reflections};
 use super::scene;
 use super::stated::StatedError;
 use super::steering::Steering;
@@ -18,7 +20,7 @@ use crate::files::Output;
 use crate::film::{Alike, Film, PixelError, SampleCounts};
 use crate::image::exr::{Origin, Picture};
 use crate::image::{Image, exr, png};
-use crate::integrators::ao::{self, AmbientOcclusion, Falloff};
+use crate::integrators::ao::AmbientOcclusion;
 use crate::integrators::gather::Gatherer;
 use crate::integrators::path::PathTracer;
 use crate::integrators::radiosity::RadiosityView;
@@ -31,7 +33,7 @@ use clap::ValueEnum;
 use luxel_scenes::{Irradiance, Rgb};
 use luxel_solver::audit;
 use luxel_solver::world::World;
-use prepare::{Prepared, indirect_field, prepare};
+use prepare::{Prepared, indirect_field, of_direct_light, prepare};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
@@ -87,18 +89,11 @@ pub(super) struct Render {
     #[arg(long, conflicts_with_all = ["error", "time"], value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     spp: Option<u32>,
 
-    /// With --integrator ao: metres beyond which nothing occludes
-    #[arg(long, value_name = "D", value_parser = super::parse_length)]
-    max_distance: Option<f64>,
+    #[command(flatten)]
+    reach: Reach,
 
-    /// With --max-distance: how nearer blockers count
-    #[arg(
-        long,
-        value_name = "HOW",
-        requires = "max_distance",
-        default_value = "sharp"
-    )]
-    falloff: Falloff,
+    #[command(flatten)]
+    reflections: Reflections,
 }
 
 /// How light is computed.
@@ -118,12 +113,14 @@ enum Method {
 
 impl Render {
     pub(super) fn run(self, session: &mut Session<'_>) -> Result<ExitCode, Failure> {
-        if self.max_distance.is_some() && self.integrator != Method::Ao {
-            return Err(Failure::new(
-                ExitCode::Usage,
-                "--max-distance belongs to --integrator ao",
-            ));
-        }
+        self.reach
+            .require(self.integrator == Method::Ao, "--integrator ao")?;
+        self.reflections.require(match self.integrator {
+            Method::Gather | Method::Whitted | Method::Path => Reflected::Some,
+            Method::Radiosity | Method::Ao => {
+                Reflected::None("--integrator gather, whitted or path")
+            }
+        })?;
         if self.png.as_ref() == Some(&self.output) {
             return Err(Failure::new(
                 ExitCode::Usage,
@@ -220,15 +217,13 @@ impl Render {
         };
         match self.integrator {
             Method::Ao => {
-                let config = ao::Config {
-                    rays: AO_RAYS,
-                    max_distance: self.max_distance,
-                    falloff: self.falloff,
-                    seed,
-                };
+                let config = self.reach.config(AO_RAYS, seed);
                 Ok(show(&AmbientOcclusion::new(world, config), 0.0))
             }
-            Method::Path => Ok(show(&PathTracer::new(world, seed), 0.0)),
+            Method::Path => {
+                let tracer = PathTracer::new(world, seed).with_bounces(self.reflections.bounces());
+                Ok(show(&tracer, 0.0))
+            }
             Method::Radiosity => {
                 let mut patches = VIEW_PATCHES;
                 loop {
@@ -245,15 +240,20 @@ impl Render {
                     patches *= FINER;
                 }
             }
+            Method::Gather | Method::Whitted if !self.reflections.bounces().reflect() => {
+                let gatherer = Gatherer::of_direct_light(world, of_direct_light(seed));
+                Ok(self.show_gathered(world, gatherer, seed, |integrator| show(integrator, 0.0)))
+            }
             Method::Gather | Method::Whitted => {
                 let most_patches = self.most_patches(world, frame, goal, context);
+                let bounces = self.reflections.bounces();
                 let Some(Prepared {
                     scene,
                     mut lookup,
                     mut patches,
                     config,
                     field_error,
-                }) = prepare(world, frame, most_patches, goal, context)?
+                }) = prepare(world, frame, most_patches, bounces, goal, context)?
                 else {
                     return Ok(None);
                 };
@@ -268,18 +268,9 @@ impl Render {
                     }
                     // What a bound on E leaves of L = ρE/π, for ρ up to one.
                     let solver_bound = lookup.solver_bound() / PI;
-                    let shown = if self.integrator == Method::Gather {
-                        show(&gatherer, solver_bound)
-                    } else {
-                        let config = whitted::Config {
-                            depth: WHITTED_DEPTH,
-                            highlight: Highlight::BlinnPhong,
-                            ambient: Irradiance::ZERO,
-                            shadow_rays: SHADOW_RAYS,
-                            seed,
-                        };
-                        show(&Whitted::new(world, Some(gatherer), config), solver_bound)
-                    };
+                    let shown = self.show_gathered(world, gatherer, seed, |integrator| {
+                        show(integrator, solver_bound)
+                    });
                     if !needs_finer(shown.as_ref(), goal, patches, context) {
                         return Ok(shown);
                     }
@@ -296,6 +287,27 @@ impl Render {
                 }
             }
         }
+    }
+
+    /// Shows what a gatherer finds, behind mirrors and glass as well where that is asked for.
+    fn show_gathered<'w>(
+        &self,
+        world: &'w World<'w>,
+        gatherer: Gatherer<'w>,
+        seed: u64,
+        show: impl Fn(&dyn Integrator) -> Option<Exposed>,
+    ) -> Option<Exposed> {
+        if self.integrator == Method::Gather {
+            return show(&gatherer);
+        }
+        let config = whitted::Config {
+            depth: WHITTED_DEPTH,
+            highlight: Highlight::BlinnPhong,
+            ambient: Irradiance::ZERO,
+            shadow_rays: SHADOW_RAYS,
+            seed,
+        };
+        show(&Whitted::new(world, Some(gatherer), config))
     }
 
     /// Exposes a film until the goal, or the number of samples, is reached.

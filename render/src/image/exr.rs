@@ -7,6 +7,7 @@
 
 use super::Image;
 use crate::film::SampleCounts;
+use exr::image::FlatImage;
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Layer, LayerAttributes,
     ReadChannels, ReadLayers, SmallVec, Text, Vec2, WritableImage,
@@ -61,6 +62,9 @@ pub enum ReadExrError {
     /// No RGB channels.
     #[error("{} has no R, G and B channels; luxel reads RGB images only", .0.display())]
     NoRgb(PathBuf),
+    /// No channel of a name.
+    #[error("{} has no channel {}", .0.display(), .1)]
+    NoChannel(PathBuf, String),
 }
 
 /// Why a picture cannot be encoded.
@@ -109,6 +113,34 @@ pub fn encode(picture: &Picture) -> Result<Vec<u8>, EncodeExrError> {
         let json = AttributeValue::Text(text(&serde_json::to_string(origin)?));
         attributes.other.insert(text(ATTRIBUTE), json);
     }
+    file(size, attributes, channels)
+}
+
+/// The bytes of an EXR file of channels of any names, each with its samples row by row.
+///
+/// # Errors
+/// When the encoder refuses.
+///
+/// # Panics
+/// When a channel has not one sample for each pixel.
+pub fn encode_channels(
+    size: [usize; 2],
+    channels: impl IntoIterator<Item = (String, Vec<f32>)>,
+) -> Result<Vec<u8>, EncodeExrError> {
+    let channels = channels.into_iter().map(|(name, samples)| {
+        assert_eq!(samples.len(), size[0] * size[1], "a sample a pixel");
+        AnyChannel::new(text(&name), FlatSamples::F32(samples))
+    });
+    let attributes = LayerAttributes::default();
+    file((size[0], size[1]), attributes, channels.collect())
+}
+
+/// The bytes of a file of one layer.
+fn file(
+    size: (usize, usize),
+    attributes: LayerAttributes,
+    channels: SmallVec<[AnyChannel<FlatSamples>; 4]>,
+) -> Result<Vec<u8>, EncodeExrError> {
     let layer = Layer::new(
         Vec2(size.0, size.1),
         attributes,
@@ -121,12 +153,23 @@ pub fn encode(picture: &Picture) -> Result<Vec<u8>, EncodeExrError> {
     Ok(bytes.into_inner())
 }
 
-/// Reads an EXR file: the first layer that has R, G and B, with its prefixed layers.
+/// The samples of a channel of any name of the first layer that has it.
 ///
 /// # Errors
-/// When the file is missing, damaged, or has no RGB channels.
-pub fn read(path: &Path) -> Result<Picture, ReadExrError> {
-    let file = exr::prelude::read()
+/// When the file is missing, damaged, or has no such channel.
+pub fn read_channel(path: &Path, name: &str) -> Result<Vec<f32>, ReadExrError> {
+    let file = open(path)?;
+    let layers = file.layer_data.iter();
+    let mut channels = layers.flat_map(|layer| &layer.channel_data.list);
+    let channel = channels
+        .find(|channel| channel.name == text(name))
+        .ok_or_else(|| ReadExrError::NoChannel(path.to_path_buf(), name.into()))?;
+    Ok(channel.sample_data.values_as_f32().collect())
+}
+
+/// All that a file holds.
+fn open(path: &Path) -> Result<FlatImage, ReadExrError> {
+    exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
         .all_channels()
@@ -134,7 +177,15 @@ pub fn read(path: &Path) -> Result<Picture, ReadExrError> {
         .all_attributes()
         .non_parallel()
         .from_file(path)
-        .map_err(|error| ReadExrError::Unreadable(path.to_path_buf(), error))?;
+        .map_err(|error| ReadExrError::Unreadable(path.to_path_buf(), error))
+}
+
+/// Reads an EXR file: the first layer that has R, G and B, with its prefixed layers.
+///
+/// # Errors
+/// When the file is missing, damaged, or has no RGB channels.
+pub fn read(path: &Path) -> Result<Picture, ReadExrError> {
+    let file = open(path)?;
     for layer in &file.layer_data {
         let Some(image) = rgb(layer, "") else {
             continue;
@@ -256,6 +307,27 @@ mod tests {
         picture.layers[0].1.width = 2;
         let error = encode(&picture).expect_err("another size").to_string();
         assert!(error.contains("standard_error"));
+    }
+
+    #[test]
+    fn channels_are_read_by_name() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("mask.exr");
+        let samples = |first: f32| vec![first, 0.25, 1.0, 0.5];
+        let channels = ["R", "G", "B", "A"].map(|name| name.to_owned());
+        let channels = channels.into_iter().zip([0.0, 0.1, 0.2, 0.3].map(samples));
+        let bytes = encode_channels([2, 2], channels).expect("encodable");
+        std::fs::write(&path, bytes).expect("writable");
+        assert_eq!(
+            read_channel(&path, "A").expect("four channels"),
+            samples(0.3)
+        );
+        assert_eq!(
+            read(&path).expect("an image").image.pixels[0],
+            [0.0, 0.1, 0.2]
+        );
+        let error = read_channel(&path, "Z").expect_err("no such").to_string();
+        assert!(error.contains("mask.exr has no channel Z"), "{error}");
     }
 
     #[test]

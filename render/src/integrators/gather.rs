@@ -39,7 +39,8 @@ enum IndirectLight {
 /// Irradiance at hits, from radiosity solutions.
 pub struct Gatherer<'w> {
     world: &'w World<'w>,
-    lookup: &'w Lookup,
+    /// `None` where direct light is all that counts.
+    lookup: Option<&'w Lookup>,
     field: Option<&'w IndirectField>,
     config: Config,
 }
@@ -50,7 +51,17 @@ impl<'w> Gatherer<'w> {
     pub fn new(world: &'w World<'w>, lookup: &'w Lookup, config: Config) -> Self {
         Self {
             world,
-            lookup,
+            lookup: Some(lookup),
+            field: None,
+            config,
+        }
+    }
+
+    /// A gatherer of direct light alone.
+    pub fn of_direct_light(world: &'w World<'w>, config: Config) -> Self {
+        Self {
+            world,
+            lookup: None,
             field: None,
             config,
         }
@@ -75,6 +86,12 @@ impl<'w> Gatherer<'w> {
         self.estimate(rays, &keys, &mut seen);
         let sum: f64 = seen.iter().map(|seen| seen.value.element_sum()).sum();
         sum / (3.0 * rays.len().max(1) as f64)
+    }
+
+    /// The solution that a sample looks up, by its position.
+    fn solution(&self, key: &SampleKey) -> usize {
+        let solutions = self.lookup.map_or(1, Lookup::solutions);
+        key.replicate as usize % solutions
     }
 
     /// What is gathered at each receiver. The samples of all keys belong to one replicate.
@@ -103,11 +120,14 @@ impl<'w> Gatherer<'w> {
             shadow_rays: self.config.shadow_rays,
             sky: SkyRays::Gather,
             gathers: 1,
-            solutions: Solutions::One(first.replicate as usize % self.lookup.solutions()),
-            components: Components::All,
+            solutions: Solutions::One(self.solution(first)),
+            components: match self.lookup {
+                Some(_) => Components::All,
+                None => Components::Direct,
+            },
             seed: self.config.seed,
         };
-        gather(self.world, Some(self.lookup), receivers, &keys, &config)
+        gather(self.world, self.lookup, receivers, &keys, &config)
     }
 
     /// Adds ρE/π of every diffuse vertex to what its slot sees. All samples belong to one replicate.
@@ -125,7 +145,7 @@ impl<'w> Gatherer<'w> {
             }
             let receiver = vertex.receiver();
             let lit = (*slot, *key, reflectance, receiver);
-            let replicate = key.replicate as usize % self.lookup.solutions();
+            let replicate = self.solution(key);
             let field = self
                 .field
                 .and_then(|field| field.at(receiver.position, receiver.normal, replicate));

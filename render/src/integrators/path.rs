@@ -9,6 +9,10 @@
 //! it, and counts in full from the camera and after a mirror or glass; every other emission and the
 //! sky are found by the paths themselves. The backs of one-sided faces are black.
 //!
+//! Where reflections are limited ([`Bounces`]) a path ends when it has used them up. They are counted from the source to the first
+//! diffuse surface that the eye sees, or to the receiver: the reflection there is not one of them, nor are mirrors and glass
+//! before it.
+//!
 //! Source: J. T. Kajiya, "The rendering equation", SIGGRAPH 1986; J. Arvo, D. Kirk, "Particle
 //! transport and image synthesis", SIGGRAPH 1990 (roulette). Unbiased; variance falls as 1/n, or a
 //! little faster for even samples. Glossy highlights are not light transport and are left out.
@@ -24,6 +28,7 @@ use crate::film::{Due, Film};
 use crate::progress::Progress;
 use glam::DVec3;
 use luxel_scenes::{Radiance, Rgb, Specular};
+use luxel_solver::bounces::Bounces;
 use luxel_solver::bvh::{Hit, Ray};
 use luxel_solver::gather::Components;
 use luxel_solver::sampling::{Frame, Sequence, Stage, cosine_hemisphere};
@@ -40,6 +45,7 @@ const MAX_SURVIVAL: f64 = 0.95;
 /// The integrator.
 pub struct PathTracer<'w> {
     world: &'w World<'w>,
+    bounces: Bounces,
     seed: u64,
 }
 
@@ -52,6 +58,9 @@ struct Path {
     sequence: Sequence,
     index: u32,
     bounce: u32,
+    /// How often light may be reflected before it comes along the ray; `None` before the first diffuse surface, where
+    /// nothing is counted.
+    left: Option<Bounces>,
     /// The diffuse vertex that the ray leaves, whose connections may find a source as well; `None`
     /// for the camera, mirrors and glass.
     connected_from: Option<Receiver>,
@@ -79,7 +88,18 @@ struct Wave {
 impl<'w> PathTracer<'w> {
     /// A path tracer in `world`. All randomness follows from `seed` and the keys of samples.
     pub fn new(world: &'w World<'w>, seed: u64) -> Self {
-        Self { world, seed }
+        Self {
+            world,
+            bounces: Bounces::All,
+            seed,
+        }
+    }
+
+    /// Light of such bounces alone.
+    #[must_use]
+    pub fn with_bounces(mut self, bounces: Bounces) -> Self {
+        self.bounces = bounces;
+        self
     }
 
     /// Adds estimates of the irradiance at receivers in W/m², of the given components, to a film of
@@ -129,6 +149,7 @@ impl<'w> PathTracer<'w> {
                 sequence: Sequence::new(self.seed, Stage::PATH, item),
                 index,
                 bounce: 0,
+                left: Some(self.bounces),
                 connected_from: Some(*receiver),
             };
             let numbers = Numbers::draw(&path);
@@ -223,6 +244,12 @@ impl<'w> PathTracer<'w> {
 
     /// Reflects a path: a connection to a light and the next ray.
     fn scatter(&self, wave: &mut Wave, path: &Path, vertex: &Vertex<'_>) {
+        // What light that this vertex reflects may have undergone before.
+        let left = match path.left.map(Bounces::before_reflection) {
+            None => None,
+            Some(Some(left)) => Some(left),
+            Some(None) => return,
+        };
         let albedo = vertex.reflectance().0;
         let specular = vertex.specular();
         let numbers = Numbers::draw(path);
@@ -241,20 +268,23 @@ impl<'w> PathTracer<'w> {
             return;
         }
         let diffuse_share = diffuse_weight / total;
-        let (direction, weight, connected_from) = if numbers.lobe < diffuse_share {
+        let (direction, weight, connected_from, left) = if numbers.lobe < diffuse_share {
             let direction = cosine_direction(vertex.shading_normal, numbers.direction);
             if direction.dot(vertex.normal()) <= 0.0 {
                 // Below the face, which only a shading normal can ask for: blocked by the face.
                 return;
             }
-            (direction, albedo / diffuse_share, Some(vertex.receiver()))
+            let receiver = Some(vertex.receiver());
+            // The first diffuse surface: from here on it counts.
+            let left = left.or(Some(self.bounces));
+            (direction, albedo / diffuse_share, receiver, left)
         } else {
             // What is left of the number chooses between reflection and refraction.
             let choice = (numbers.lobe - diffuse_share) / (1.0 - diffuse_share);
             let Some((direction, weight)) = scatter_specular(vertex, specular, choice) else {
                 return;
             };
-            (direction, weight / (1.0 - diffuse_share), None)
+            (direction, weight / (1.0 - diffuse_share), None, left)
         };
         let mut throughput = path.throughput * weight;
         if path.bounce >= ROULETTE_FROM {
@@ -272,6 +302,7 @@ impl<'w> PathTracer<'w> {
                 sequence: path.sequence,
                 index: path.index,
                 bounce: path.bounce + 1,
+                left,
                 connected_from,
             });
         }
@@ -322,6 +353,7 @@ impl Integrator for PathTracer<'_> {
             sequence: Sequence::new(self.seed, Stage::PATH, key.item),
             index: key.index,
             bounce: 0,
+            left: None,
             connected_from: None,
         }));
         self.run(&mut wave, &mut values);

@@ -29,6 +29,12 @@ pub struct Manifest {
     pub lightmap: Layer,
     /// Further sets of maps, with the same coordinates.
     pub others: Vec<Layer>,
+    /// Which share of each light reaches a texel, four lights a picture, with the same coordinates.
+    #[serde(default)]
+    pub masks: Vec<Masks>,
+    /// Most reflections of the light; `None` where it was reflected as often as it is.
+    #[serde(default)]
+    pub bounces: Option<u32>,
     /// How the scene is sampled.
     pub atlas: Sampling,
     /// Every object with the place that it has.
@@ -44,7 +50,8 @@ pub struct Manifest {
 /// A set of maps, a page each.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Layer {
-    /// What they hold: `all`, `direct` or `indirect` light, or `ao`.
+    /// What they hold: `all`, `direct` or `indirect` light, `sky` (a part of direct light: what comes straight from sky and
+    /// environment), or `ao`.
     pub include: String,
     /// The maps.
     pub pages: Vec<Page>,
@@ -54,6 +61,39 @@ pub struct Layer {
     pub energy: Option<Energy>,
     /// Patches of the radiosity solution.
     pub patches: usize,
+}
+
+/// Shadow masks of up to four lights, a channel each: from 0 (hidden, or below the horizon) to 1 (wholly seen).
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Masks {
+    /// The lights, in the order of the channels. Channels without one hold 1.
+    pub lights: Vec<Masked>,
+    /// The pictures, one for each page of the lightmap, with channels R, G, B and A that are not premultiplied.
+    pub pages: Vec<MaskPage>,
+}
+
+/// A light with its mask.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Masked {
+    /// Its name in the scene; of emissive surfaces, that of the object.
+    pub name: String,
+    /// `point`, `spot`, `directional` or `surface`.
+    pub kind: String,
+    /// `R`, `G`, `B` or `A`.
+    pub channel: String,
+    /// Errors of the share, whose whole is 1; not relative to a mean.
+    pub error: Error,
+}
+
+/// A picture of masks.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct MaskPage {
+    /// What the engine loads.
+    pub file: String,
+    /// Standard error of its texels.
+    pub error: String,
+    /// What was found at luxels, before anything was filled or filtered, with its standard error in the layer `error`.
+    pub luxels: String,
 }
 
 /// What a texel holds.

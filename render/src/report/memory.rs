@@ -6,6 +6,7 @@ use super::solver::Solver;
 use crate::film::Film;
 use luxel_scenes::Scene;
 use luxel_solver::adaptive::{bytes_to_gather, bytes_to_solve};
+use luxel_solver::bounces::Bounces;
 use luxel_solver::patches::Patches;
 use luxel_solver::transport::{Columns, Dense, SparseRows};
 
@@ -32,8 +33,10 @@ impl Family {
                 let columns = Columns::bytes_for(patches, entries.min(pairs));
                 3 * SparseRows::bytes_for(patches, entries) + columns
             }
-            Self::Radiosity => bytes_to_solve(patches, scene),
-            Self::Gather => bytes_to_solve(patches, scene) + bytes_to_gather(receivers),
+            Self::Radiosity => bytes_to_solve(patches, Bounces::All, scene),
+            Self::Gather => {
+                bytes_to_solve(patches, Bounces::All, scene) + bytes_to_gather(receivers)
+            }
             Self::Path => 0,
         };
         Patches::bytes_for(patches, scene) + work + at_receivers

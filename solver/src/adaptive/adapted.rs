@@ -7,7 +7,8 @@ use super::{
     AdaptiveConfig, Budget, Changes, Control, ROW_RAYS, SAFETY, Spent, Stage, WORTHWHILE,
     first_budget,
 };
-use crate::gather::{Lookup, MAX_REPLICATES, error_parts};
+use crate::bounces::Bounces;
+use crate::gather::{Lookup, MAX_REPLICATES, error_parts, orders};
 use crate::patches::{Density, Patches};
 use crate::pilot::{self, PilotError};
 use crate::radiosity::{self, RadiosityConfig, RadiositySolution};
@@ -36,19 +37,26 @@ const MAX_ITERATIONS: usize = 20_000;
 pub struct Adapted<'w, 's> {
     world: &'w World<'s>,
     density: Density,
+    bounces: Bounces,
     seed: u64,
 }
 
 impl<'w, 's> Adapted<'w, 's> {
-    /// Finds out where the light is.
+    /// Finds out where the light is. Solutions will be such that what is gathered from them was reflected as often as
+    /// `bounces` says.
     ///
     /// # Errors
     /// As [`pilot::density`].
-    pub fn new(world: &'w World<'s>, seed: u64) -> Result<Self, PilotError> {
+    ///
+    /// # Panics
+    /// When no bounce is asked for: nothing is then looked up.
+    pub fn new(world: &'w World<'s>, bounces: Bounces, seed: u64) -> Result<Self, PilotError> {
+        assert!(bounces.reflect(), "solutions hold reflected light");
         let density = pilot::density(world, seed)?;
         Ok(Self {
             world,
             density,
+            bounces,
             seed,
         })
     }
@@ -97,7 +105,13 @@ impl<'w, 's> Adapted<'w, 's> {
             seed: self.seed,
             replicate,
         };
-        radiosity::solve(self.world, patches, &config)
+        match self.bounces {
+            Bounces::All => radiosity::solve(self.world, patches, &config),
+            Bounces::AtMost(most) => {
+                let orders = orders(self.bounces);
+                radiosity::solve_partial(self.world, patches, most, orders, &config)
+            }
+        }
     }
 
     /// Solutions that are good enough for a relative error at `count` receivers of which `sample`

@@ -36,6 +36,7 @@ fn check(scene: &Scene, side: usize, components: Components, error: f64, tries: 
     let config = AdaptiveConfig {
         error,
         components,
+        bounces: Bounces::All,
         most_patches: usize::MAX,
         seed: 3,
     };
@@ -83,6 +84,7 @@ fn a_finer_mesh_is_made_anew() {
     let config = AdaptiveConfig {
         error: 0.05,
         components: Components::All,
+        bounces: Bounces::All,
         most_patches: usize::MAX,
         seed: 3,
     };

@@ -5,8 +5,9 @@
 
 use super::budget::{Budget, JOINED_FROM, ROW_RAYS};
 use super::{SAFETY, WORTHWHILE};
+use crate::bounces::Bounces;
 use crate::field::Cells;
-use crate::gather::{Gathered, JOINED_COLUMNS, Lookup, MAX_REPLICATES, Tally};
+use crate::gather::{Gathered, JOINED_COLUMNS, Lookup, MAX_REPLICATES, Tally, orders};
 use crate::patches::Patches;
 use crate::radiosity::{self, RadiositySolution};
 use crate::world::Receiver;
@@ -14,10 +15,13 @@ use luxel_scenes::Scene;
 
 /// Memory while a mesh of about so many patches is solved, and another of a quarter of them, in bytes: both meshes, all
 /// solutions, and the work on the last one.
-pub fn bytes_to_solve(patches: usize, scene: &Scene) -> usize {
+pub fn bytes_to_solve(patches: usize, bounces: Bounces, scene: &Scene) -> usize {
     let fine = Patches::at_most(patches);
     let coarse = fine / 4;
-    let solutions = |patches| MAX_REPLICATES * RadiositySolution::bytes_for(patches, false);
+    let solutions = |patches| {
+        let own = RadiositySolution::bytes_for(patches, false);
+        MAX_REPLICATES * (own + RadiositySolution::bytes_for_orders(patches, orders(bounces)))
+    };
     Patches::bytes_for(fine, scene)
         + Patches::bytes_for(coarse, scene)
         + solutions(fine)
@@ -27,9 +31,10 @@ pub fn bytes_to_solve(patches: usize, scene: &Scene) -> usize {
 
 /// As [`bytes_to_solve`], while coarser solutions are kept that the new ones take the place of: at least
 /// so much finer as is worth a new mesh.
-pub fn bytes_to_refine(patches: usize, scene: &Scene) -> usize {
+pub fn bytes_to_refine(patches: usize, bounces: Bounces, scene: &Scene) -> usize {
     let kept = (Patches::at_most(patches) as f64 / WORTHWHILE) as usize;
-    bytes_to_solve(patches, scene) + Lookup::bytes_for(kept, MAX_REPLICATES, scene)
+    bytes_to_solve(patches, bounces, scene)
+        + Lookup::bytes_for(kept, MAX_REPLICATES, bounces, scene)
 }
 
 /// Memory while receivers are gathered, in bytes, the receivers themselves included: what was gathered, what is made of

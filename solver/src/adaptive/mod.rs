@@ -33,6 +33,7 @@ pub use checkpoint::Checkpoint;
 pub use indirect_field::FieldGather;
 pub use memory::{bytes_to_gather, bytes_to_refine, bytes_to_solve, first_patches};
 
+use crate::bounces::Bounces;
 use crate::gather::{Components, ErrorParts, Lookup, Tally};
 use crate::pilot::PilotError;
 use crate::solvers::Ledger;
@@ -127,6 +128,8 @@ pub struct AdaptiveConfig {
     pub error: f64,
     /// Which light.
     pub components: Components,
+    /// How often it may be reflected.
+    pub bounces: Bounces,
     /// Patches that no mesh may be asked to have more of, for want of memory: rays make up for the mesh
     /// as far as they can.
     pub most_patches: usize,
@@ -152,23 +155,39 @@ pub struct Adaptive {
     pub ending: Ending,
 }
 
+impl AdaptiveConfig {
+    /// The same, of the light that there is within its bounces.
+    fn within_bounces(&self) -> Self {
+        let components = self.components.within(self.bounces);
+        Self {
+            components: components
+                .expect("without a bounce there is no reflected light to ask for"),
+            ..*self
+        }
+    }
+}
+
 /// Irradiance at receivers, until `control` is satisfied.
 ///
 /// # Errors
 /// When the scene cannot be meshed or its system not be solved, which a scene that was read without
 /// errors excludes.
+///
+/// # Panics
+/// When reflected light alone is asked for, and no bounce.
 pub fn irradiance(
     world: &World,
     receivers: &[Receiver],
     config: &AdaptiveConfig,
     control: &mut dyn Control,
 ) -> Result<Adaptive, PilotError> {
+    let config = &config.within_bounces();
     let error = config.error / SAFETY;
     let mut budget = first_budget(world, error, receivers.len());
     let mut lookup = None;
     let mut adapted = None;
     if config.components != Components::Direct {
-        let scene = adapted.insert(Adapted::new(world, config.seed)?);
+        let scene = adapted.insert(Adapted::new(world, config.bounces, config.seed)?);
         match scene.prepare(receivers, receivers.len(), config, control)? {
             Some((solved, planned)) => {
                 let (share, fewest) = if receivers.len() >= JOINED_FROM {
@@ -208,11 +227,12 @@ pub fn resume(
     checkpoint: Checkpoint<'_>,
     control: &mut dyn Control,
 ) -> Result<Adaptive, PilotError> {
+    let config = &config.within_bounces();
     let mut gathering = Gathering::from_checkpoint(world, receivers, config, checkpoint);
     let mut lookup = None;
     let mut adapted = None;
     if config.components != Components::Direct {
-        let scene = adapted.insert(Adapted::new(world, config.seed)?);
+        let scene = adapted.insert(Adapted::new(world, config.bounces, config.seed)?);
         lookup = scene.solve(gathering.spent.patches, control)?;
         if lookup.is_none() {
             return Ok(Adaptive::none());
@@ -312,6 +332,9 @@ fn refine(
 ///
 /// # Errors
 /// As [`irradiance`].
+///
+/// # Panics
+/// As [`irradiance`].
 pub fn irradiance_for(
     world: &World,
     receivers: &[Receiver],
@@ -319,9 +342,11 @@ pub fn irradiance_for(
     config: &AdaptiveConfig,
     control: &mut dyn Control,
 ) -> Result<Adaptive, PilotError> {
+    let config = &config.within_bounces();
     let mut lookup = None;
     if config.components != Components::Direct {
-        lookup = Adapted::new(world, config.seed)?.solve(budget.patches, control)?;
+        lookup =
+            Adapted::new(world, config.bounces, config.seed)?.solve(budget.patches, control)?;
         if lookup.is_none() {
             return Ok(Adaptive::none());
         }

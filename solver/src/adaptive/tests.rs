@@ -47,6 +47,7 @@ fn run(error: f64, left: usize) -> (Adaptive, usize) {
     let config = AdaptiveConfig {
         error,
         components: Components::All,
+        bounces: Bounces::All,
         most_patches: usize::MAX,
         seed: 1,
     };
@@ -81,6 +82,7 @@ fn reflected_light_alone_reaches_its_error() {
         let config = AdaptiveConfig {
             error: 0.008,
             components: Components::Indirect,
+            bounces: Bounces::All,
             most_patches: usize::MAX,
             seed: 1,
         };
@@ -144,6 +146,7 @@ fn many_receivers_share_few_rays_and_are_right() {
         let config = AdaptiveConfig {
             error,
             components: Components::All,
+            bounces: Bounces::All,
             most_patches: usize::MAX,
             seed,
         };
@@ -172,7 +175,7 @@ fn a_field_is_as_exact_as_it_says() {
     let scene = generate::cornell_box();
     let world = World::new(&scene);
     let receivers = on_the_floor(&world, 64);
-    let adapted = Adapted::new(&world, 1).expect("a scene");
+    let adapted = Adapted::new(&world, Bounces::All, 1).expect("a scene");
     let lookup = adapted.solve(2000, &mut unlimited(0.0)).expect("a scene");
     let lookup = lookup.expect("nothing stops it");
     let weights = vec![luxel_scenes::Rgb::ONE; receivers.len()];
@@ -223,6 +226,7 @@ fn joined_receivers_are_the_same_at_any_number_of_threads() {
     let config = AdaptiveConfig {
         error: 0.1,
         components: Components::All,
+        bounces: Bounces::All,
         most_patches: usize::MAX,
         seed: 4,
     };
@@ -246,6 +250,7 @@ fn a_mesh_that_may_not_grow_is_the_reason() {
     let config = AdaptiveConfig {
         error: 0.0005,
         components: Components::All,
+        bounces: Bounces::All,
         most_patches: 400,
         seed: 1,
     };

@@ -195,6 +195,35 @@ impl Lights {
         }
     }
 
+    /// Some of the sources, by their places, and nothing else: for direct light from them alone. Rays that meet surfaces must not
+    /// count what these emit, which nobody here knows to be a source.
+    ///
+    /// # Panics
+    /// When there is no such source.
+    #[must_use]
+    pub fn only(&self, sources: &[usize]) -> Self {
+        let sources: Vec<Source> = sources.iter().map(|&i| self.sources[i].clone()).collect();
+        Self {
+            importance: Importance::new(&sources),
+            sources,
+            front_source: vec![None; self.front_source.len()],
+            sky: None,
+            has_unlisted_emission: false,
+        }
+    }
+
+    /// The sky of a scene and nothing else, in the same sense.
+    #[must_use]
+    pub fn sky_of(scene: &Scene) -> Self {
+        Self {
+            importance: Importance::default(),
+            sources: Vec::new(),
+            front_source: vec![None; scene.faces.len()],
+            sky: SkyDome::new(scene),
+            has_unlisted_emission: false,
+        }
+    }
+
     /// The sources that shadow rays are cast to.
     pub fn sources(&self) -> &[Source] {
         &self.sources
@@ -318,7 +347,11 @@ fn polygons(surfaces: &Surfaces, geometry: &Geometry, emissive: &[FaceId]) -> Ve
         .collect::<Vec<_>>();
     let merged = merge(
         single,
-        |a, b| surfaces.material_id(a[0]) == surfaces.material_id(b[0]),
+        // A light of one object, so that lights can be told apart by theirs.
+        |a, b| {
+            let object = |face: FaceId| surfaces.scene().faces[face.index()].object;
+            surfaces.material_id(a[0]) == surfaces.material_id(b[0]) && object(a[0]) == object(b[0])
+        },
         Extend::extend,
     );
     merged

@@ -11,6 +11,7 @@ mod kernel;
 mod lights;
 mod lit;
 mod merge;
+mod named;
 mod sampler;
 mod sky;
 
@@ -18,4 +19,5 @@ pub(crate) use dome::{Dome, DomeRays};
 pub use kernel::Luminaire;
 pub use lights::{Distribution, Lights, Source};
 pub use lit::Lit;
+pub use named::{NamedKind, NamedLight};
 pub use sampler::{DirectSampler, Sample, ShadowRays};

@@ -5,8 +5,11 @@
 //! gather's own. A second, coarser mesh with solutions of its own may be looked up at the same hits;
 //! the difference of the two tells what finite patches leave out, again free of the gather's noise.
 //! Single precision: 6·10⁻⁸ relative, far below what rays can resolve. Cost: 12 bytes a class and
-//! solution; the solutions of a class lie next to each other in memory.
+//! solution; the solutions of a class lie next to each other in memory. Where reflections are counted
+//! ([`Bounces`]) each link of a chain looks up light that was reflected once less: as many times the memory.
 
+use super::near_chain::MAX_LINKS;
+use crate::bounces::Bounces;
 use crate::geometry::TriangleId;
 use crate::patches::{PatchId, Patches, Side};
 use crate::radiosity::{Class, RadiositySolution, unknown};
@@ -26,6 +29,8 @@ pub struct Lookup {
     fine: Table,
     coarse: Option<Table>,
     solutions: usize,
+    /// Of the light that a gather from here finds: once more than of what is looked up.
+    bounces: Bounces,
     solver_bound: f64,
     ledger: Ledger,
 }
@@ -40,21 +45,27 @@ pub enum Solutions {
 }
 
 impl Lookup {
-    /// The patches of a mesh with independent solutions on it.
+    /// The patches of a mesh with independent solutions on it, all of the same [`RadiositySolution::bounces`]: a gather finds
+    /// light that was reflected once more.
     ///
     /// # Panics
-    /// When there is no solution or there are more than [`MAX_REPLICATES`].
+    /// When there is no solution or there are more than [`MAX_REPLICATES`], or they are of different bounces.
     pub fn new(patches: Patches, solutions: &[RadiositySolution]) -> Self {
         assert!(
             (1..=MAX_REPLICATES).contains(&solutions.len()),
             "one to {MAX_REPLICATES} solutions"
         );
+        let bounces = bounces_of(solutions);
         let ledgers: Vec<Ledger> = solutions.iter().map(|solution| solution.ledger).collect();
         Self {
             ledger: Ledger::mean(&ledgers),
             fine: Table::new(patches, solutions),
             coarse: None,
             solutions: solutions.len(),
+            bounces: match bounces {
+                Bounces::All => Bounces::All,
+                Bounces::AtMost(most) => Bounces::AtMost(most + 1),
+            },
             solver_bound: solutions
                 .iter()
                 .map(|solution| solution.error_bound.max_element())
@@ -65,19 +76,25 @@ impl Lookup {
     /// Adds a coarser mesh of the same scene, for the error that patches make.
     ///
     /// # Panics
-    /// When it does not have as many solutions.
+    /// When it does not have as many solutions, of the same bounces.
     #[must_use]
     pub fn with_coarse(mut self, patches: Patches, solutions: &[RadiositySolution]) -> Self {
         assert_eq!(solutions.len(), self.solutions, "as many solutions as fine");
+        let reflected = Some(bounces_of(solutions));
+        assert_eq!(
+            reflected,
+            self.bounces.before_reflection(),
+            "the same light"
+        );
         self.coarse = Some(Table::new(patches, solutions));
         self
     }
 
-    /// Memory of so many solutions on so many patches, and on a quarter as many, in bytes.
-    pub fn bytes_for(patches: usize, solutions: usize, scene: &Scene) -> usize {
+    /// Memory of so many solutions on so many patches, and on a quarter as many, in bytes, for a gather of such bounces.
+    pub fn bytes_for(patches: usize, solutions: usize, bounces: Bounces, scene: &Scene) -> usize {
         let table = |patches: usize| {
             Patches::bytes_for(patches, scene)
-                + patches * Class::COUNT * solutions * size_of::<Vec3>()
+                + patches * Class::COUNT * solutions * orders(bounces) * size_of::<Vec3>()
         };
         table(patches) + table(patches / 4)
     }
@@ -111,15 +128,22 @@ impl Lookup {
         }
     }
 
-    /// Irradiance of a patch of the mesh in W/m² as seen from a distance (in units), by solution.
-    pub(super) fn irradiance(&self, patch: PatchId, distance: f32) -> &[Vec3] {
-        self.fine.irradiance(patch, distance, self.solutions)
+    /// Whether light counts that the hit at the end of a link of a chain reflects.
+    pub(super) fn reflects(&self, link: u32) -> bool {
+        self.bounces.include(link + 1)
+    }
+
+    /// Irradiance of a patch of the mesh in W/m² as seen from a distance (in units), by solution: what counts at the end of a link
+    /// at which the mesh [reflects](Self::reflects).
+    pub(super) fn irradiance(&self, link: u32, patch: PatchId, distance: f32) -> &[Vec3] {
+        self.fine.irradiance(link, patch, distance, self.solutions)
     }
 
     /// The same at a position (unit frame) of a triangle, seen from `origin`, on the coarse mesh, with the size of its patch in units; `None` without
     /// one.
     pub(super) fn coarse_irradiance(
         &self,
+        link: u32,
         origin: DVec3,
         triangle: TriangleId,
         position: DVec3,
@@ -130,37 +154,59 @@ impl Lookup {
         let patch = coarse
             .patches
             .seen_from(origin, triangle, || position, side)?;
-        let irradiance = coarse.irradiance(patch, distance, self.solutions);
+        let irradiance = coarse.irradiance(link, patch, distance, self.solutions);
         Some((irradiance, coarse.patches.size(patch)))
     }
 }
 
+/// Tables that a gather of such bounces looks up: one for each link of its chains.
+pub(crate) fn orders(bounces: Bounces) -> usize {
+    match bounces {
+        Bounces::All => 1,
+        Bounces::AtMost(most) => most.min(MAX_LINKS + 1) as usize,
+    }
+}
+
+/// The bounces that solutions have in common.
+fn bounces_of(solutions: &[RadiositySolution]) -> Bounces {
+    let bounces = solutions[0].bounces();
+    assert!(
+        solutions.iter().all(|other| other.bounces() == bounces),
+        "all solutions hold light of the same bounces"
+    );
+    bounces
+}
+
 struct Table {
     patches: Patches,
-    /// By unknown and, within it, by solution.
-    irradiance: Vec<Vec3>,
+    /// By order and, within it, by unknown and by solution.
+    irradiance: Vec<Vec<Vec3>>,
 }
 
 impl Table {
     fn new(patches: Patches, solutions: &[RadiositySolution]) -> Self {
-        let irradiance = patches
-            .ids()
-            .flat_map(|patch| Class::all().map(|class| (patch, class)))
-            .flat_map(|(patch, class)| {
-                solutions
-                    .iter()
-                    .map(move |solution| solution.irradiance(patch, class).0.as_vec3())
-            })
-            .collect();
+        let orders = solutions[0].orders().len();
+        let of_order = |order: usize| {
+            let unknowns = 0..patches.len() * Class::COUNT;
+            unknowns
+                .flat_map(|unknown| {
+                    solutions
+                        .iter()
+                        .map(move |solution| solution.orders()[order][unknown].0.as_vec3())
+                })
+                .collect()
+        };
         Self {
+            irradiance: (0..orders).map(of_order).collect(),
             patches,
-            irradiance,
         }
     }
 
-    fn irradiance(&self, patch: PatchId, distance: f32, solutions: usize) -> &[Vec3] {
+    fn irradiance(&self, link: u32, patch: PatchId, distance: f32, solutions: usize) -> &[Vec3] {
+        // A whole series is the same at every link.
+        let order = (link as usize).min(self.irradiance.len() - 1);
         let class = Class::at(distance, self.patches.size(patch));
         let first = unknown(patch, class) * solutions;
-        &self.irradiance[first..first + solutions]
+        &self.irradiance[order][first..first + solutions]
     }
 }

@@ -26,10 +26,12 @@ mod tally;
 pub use error_parts::{ErrorParts, error_parts};
 pub(crate) use joined::COLUMNS as JOINED_COLUMNS;
 pub use joined::{IndirectField, joined};
+pub(crate) use lookup::orders;
 pub use lookup::{Lookup, MAX_REPLICATES, Solutions};
 pub(crate) use tally::SHADOW_EXPONENT;
 pub use tally::{Gathered, Tally, finish};
 
+use crate::bounces::Bounces;
 use crate::direct::{DirectSampler, Dome, DomeRays, Lit, Sample, ShadowRays};
 use crate::sampling::{Sequence, Stage, hash};
 use crate::world::{Receiver, World};
@@ -48,6 +50,18 @@ pub enum Components {
     Direct,
     /// After at least one reflection.
     Indirect,
+}
+
+impl Components {
+    /// What is left of it where light may be reflected so often: direct light where it may not, and nothing (`None`) of
+    /// reflected light.
+    pub fn within(self, bounces: Bounces) -> Option<Self> {
+        match self {
+            _ if bounces.reflect() => Some(self),
+            Self::All | Self::Direct => Some(Self::Direct),
+            Self::Indirect => None,
+        }
+    }
 }
 
 /// What finds the light of the sky at a receiver.

@@ -11,6 +11,10 @@
 //! The mean is that of the chain whatever E' is; where the solution shows what the chain finds, as in a
 //! furnace, the choice makes no noise. After [`MAX_LINKS`] links the class of the distance answers.
 //!
+//! Where reflections are counted, every hit is one: that at the end of link l shows light which was reflected l times less
+//! than the first may show, whether it is looked up or gone on from, so that a chain never finds light of more bounces than are
+//! asked for. The last reflection gets the light of sources alone.
+//!
 //! Source: L. Szécsi, L. Szirmay-Kalos, C. Kelemen, "Variance Reduction for Russian-roulette",
 //! Journal of WSCG 11(3), 2003.
 //!
@@ -30,7 +34,7 @@ use std::ops::Range;
 
 /// Links after which a chain is looked up wherever it is: light in crevices of that depth is
 /// below 1 % of what entered for ρ ≤ 0.75. More measured no different.
-const MAX_LINKS: u32 = 16;
+pub(super) const MAX_LINKS: u32 = 16;
 
 /// Distance, in sizes of the patch that is hit, from which it is looked up: a tuned value. Smaller,
 /// and fine meshes get dark gaps wrong (17 000 patches of a furnished office at 1, 1.5 and 2: 9.4,
@@ -243,7 +247,9 @@ impl<'a> Chains<'a> {
                 let light = path.throughput * emitted.0;
                 found.add_emitted(&mut path, link, light);
             }
-            let Some(lookup) = self.lookup else { continue };
+            let Some(lookup) = self.lookup.filter(|lookup| lookup.reflects(link)) else {
+                continue;
+            };
             let throughput = path.throughput * surfaces.reflectance(point).0;
             if throughput == Rgb::ZERO {
                 continue;
@@ -254,12 +260,12 @@ impl<'a> Chains<'a> {
             let Some(patch) = patches.seen_from(origin, triangle, || position, side) else {
                 continue;
             };
-            let shown = lookup.irradiance(patch, hit.t);
+            let shown = lookup.irradiance(link, patch, hit.t);
             let range = lookup.range(self.solutions);
             if hit.t >= REACH * patches.size(patch) || link == MAX_LINKS {
                 found.look_up(&mut path, throughput, shown, range.clone());
                 if let Some((coarse, size)) =
-                    lookup.coarse_irradiance(origin, triangle, position, side, hit.t)
+                    lookup.coarse_irradiance(link, origin, triangle, position, side, hit.t)
                 {
                     let is_near = hit.t < REACH * size;
                     let weight = if is_near { NEAR_WEIGHT } else { 1.0 };
@@ -314,9 +320,15 @@ impl<'a> Chains<'a> {
             .irradiance(&samples, ShadowRays::One, &mut direct);
         self.paths.clear();
         self.rays.clear();
+        // After the last reflection only light that shadow rays do not reach is left to find.
+        let reflects = self.lookup.is_some_and(|lookup| lookup.reflects(link + 1));
+        let goes_on = reflects || self.world.lights().are_found_by_rays();
         for ((mut path, receiver), direct) in near.into_iter().zip(direct) {
             let light = path.throughput * direct.0;
             found[path.receiver as usize].add_chained(&mut path, light);
+            if !goes_on {
+                continue;
+            }
             let u = sequence(&path, Stage::NEAR_CHAIN).point4_f32(path.ray);
             let frame = sampling::Frame::around(receiver.normal.as_vec3());
             let local = cosine_hemisphere::sample([u[0], u[1]]);

@@ -5,16 +5,20 @@
 //! only: B = ρ (E^direct + F B).
 
 mod memory;
+mod partial;
 mod rows;
 
 pub use memory::bytes_to_solve;
+pub use partial::solve_partial;
 
+use crate::bounces::Bounces;
 use crate::direct::Lights;
 use crate::error;
 use crate::patches::{PatchId, Patches};
-use crate::solvers::{self, Config, Ledger, Outcome, System, SystemError};
+use crate::solvers::{self, Config, Ledger, Outcome, Solution, System, SystemError};
 use crate::world::World;
 use luxel_scenes::{Exitance, Irradiance, Radiosity, Reflectance, Rgb};
+use rows::CastRows;
 
 /// The unknowns of a patch: how it looks from afar, and from distances ever smaller than its size.
 ///
@@ -79,7 +83,9 @@ pub struct RadiosityConfig {
 
 /// Light received by the patches of a scene, by class.
 pub struct RadiositySolution {
-    irradiance: Vec<Irradiance>,
+    /// By unknown, of all light that counts; then, for partial sums, of what was reflected ever less often.
+    irradiance: Vec<Vec<Irradiance>>,
+    bounces: Bounces,
     rays: Vec<u32>,
     coarsening: Vec<Irradiance>,
     /// How the iteration ended.
@@ -105,9 +111,25 @@ impl RadiositySolution {
             + usize::from(against) * patches * size_of::<Irradiance>()
     }
 
+    /// Memory of the light of a partial sum that was reflected less often, in `orders` tables with the first, in bytes.
+    pub fn bytes_for_orders(patches: usize, orders: usize) -> usize {
+        orders.saturating_sub(1) * patches * Class::COUNT * size_of::<Irradiance>()
+    }
+
     /// Irradiance (direct and reflected) of a patch as seen in a class, in W/m².
     pub fn irradiance(&self, patch: PatchId, class: Class) -> Irradiance {
-        self.irradiance[unknown(patch, class)]
+        self.irradiance[0][unknown(patch, class)]
+    }
+
+    /// Irradiance in W/m² by unknown: of all light that counts first, then of what was reflected once less, twice less, ….
+    /// A whole series holds the same however often one reflects it, and has one.
+    pub(crate) fn orders(&self) -> &[Vec<Irradiance>] {
+        &self.irradiance
+    }
+
+    /// How often the light that patches receive was reflected.
+    pub fn bounces(&self) -> Bounces {
+        self.bounces
     }
 
     /// Mean irradiance of a patch over its area in W/m².
@@ -117,7 +139,7 @@ impl RadiositySolution {
         unknowns
             .iter()
             .filter(|&&u| self.rays[u] > 0)
-            .map(|&u| self.irradiance[u] * (f64::from(self.rays[u]) / total))
+            .map(|&u| self.irradiance[0][u] * (f64::from(self.rays[u]) / total))
             .sum()
     }
 
@@ -168,40 +190,81 @@ pub fn solve_against(
     run(world, patches, Some(&parents), config)
 }
 
+/// A system with what it is made of.
+struct Assembly {
+    cast: CastRows,
+    reflectance: Vec<Reflectance>,
+    /// Emission that rays find.
+    emission: Vec<Exitance>,
+    source: Vec<Radiosity>,
+    areas: Vec<f64>,
+}
+
+impl Assembly {
+    /// Casts the rows of a scene's patches.
+    fn new(world: &World, patches: &Patches, config: &RadiosityConfig) -> Self {
+        let cast = rows::cast(world, patches, config);
+        let reflectance: Vec<Reflectance> = patches
+            .reflectances()
+            .iter()
+            .flat_map(|&value| [value; Class::COUNT])
+            .collect();
+        let emission = gathered_emission(world.lights(), patches);
+        let source = solvers::source(&emission, &reflectance, &cast.direct);
+        let frame = world.surfaces().geometry().frame();
+        let areas: Vec<f64> = (0..patches.len())
+            .flat_map(|index| {
+                let patch = PatchId::new(index);
+                let area = frame.area_to_world(patches.areas()[index]);
+                let weights = Class::all().map(|c| f64::from(cast.weights[unknown(patch, c)]));
+                let total = weights.iter().sum::<f64>().max(1.0);
+                weights.map(|weight| area * weight / total)
+            })
+            .collect();
+        Self {
+            cast,
+            reflectance,
+            emission,
+            source,
+            areas,
+        }
+    }
+
+    fn system(&self) -> Result<System<'_>, SystemError> {
+        System::new(
+            &self.cast.rows,
+            &self.areas,
+            &self.reflectance,
+            &self.source,
+        )
+    }
+
+    fn ledger(&self, system: &System, solution: &Solution) -> Ledger {
+        Ledger::new(system, solution, &self.emission, &self.cast.direct)
+    }
+
+    /// Direct light and that of surfaces together.
+    fn with_direct(&self, of_surfaces: &[Irradiance]) -> Vec<Irradiance> {
+        let both = of_surfaces.iter().zip(&self.cast.direct);
+        both.map(|(&e, &direct)| e + direct).collect()
+    }
+}
+
 fn run(
     world: &World,
     patches: &Patches,
     parents: Option<&[PatchId]>,
     config: &RadiosityConfig,
 ) -> Result<RadiositySolution, SystemError> {
-    let cast = rows::cast(world, patches, config);
-    let per_class = |values: &[Reflectance]| -> Vec<Reflectance> {
-        values
-            .iter()
-            .flat_map(|&value| [value; Class::COUNT])
-            .collect()
-    };
-    let reflectance = per_class(patches.reflectances());
-    let gathered = gathered_emission(world.lights(), patches);
-    let source: Vec<Radiosity> = reflectance
-        .iter()
-        .zip(&cast.direct)
-        .zip(&gathered)
-        .map(|((&rho, &direct), &emission)| emission + rho * direct)
-        .collect();
-    let frame = world.surfaces().geometry().frame();
-    let areas: Vec<f64> = (0..patches.len())
-        .flat_map(|index| {
-            let patch = PatchId::new(index);
-            let area = frame.area_to_world(patches.areas()[index]);
-            let weights = Class::all().map(|c| f64::from(cast.weights[unknown(patch, c)]));
-            let total = weights.iter().sum::<f64>().max(1.0);
-            weights.map(|weight| area * weight / total)
-        })
-        .collect();
-    let system = System::new(&cast.rows, &areas, &reflectance, &source)?;
+    let assembly = Assembly::new(world, patches, config);
+    let system = assembly.system()?;
     let solution = solvers::jacobi(&system, &config.solver, solvers::no_progress);
-    let ledger = Ledger::new(&system, &solution, &gathered, &cast.direct);
+    let Assembly {
+        cast,
+        reflectance,
+        areas,
+        ..
+    } = &assembly;
     let coarsening = parents.map_or_else(Vec::new, |parents| {
         let classes: Vec<u32> = parents
             .iter()
@@ -210,8 +273,8 @@ fn run(
         let d = error::coarsening(
             &cast.rows,
             &classes,
-            &areas,
-            &reflectance,
+            areas,
+            reflectance,
             &solution.radiosity,
         );
         patches
@@ -229,23 +292,18 @@ fn run(
             })
             .collect()
     });
-    let irradiance = solution
-        .irradiance
-        .iter()
-        .zip(&cast.direct)
-        .map(|(&e, &direct)| e + direct)
-        .collect();
     Ok(RadiositySolution {
-        irradiance,
-        rays: cast.weights,
+        irradiance: vec![assembly.with_direct(&solution.irradiance)],
+        bounces: Bounces::All,
         coarsening,
         outcome: solution.outcome,
         iterations: solution.iterations,
         residual: solution.residual,
         error_bound: solution.error_bound,
-        ledger,
-        row_rays: cast.cast_rays,
-        buried_points: cast.buried_points,
+        ledger: assembly.ledger(&system, &solution),
+        row_rays: assembly.cast.cast_rays,
+        buried_points: assembly.cast.buried_points,
+        rays: assembly.cast.weights,
     })
 }
 

@@ -1,6 +1,6 @@
 //! Writes the folder of a bake, each file whole or not at all and the manifest last: a folder with a manifest is complete.
 
-use super::{Baked, Include, Layer, texels_per_metre};
+use super::{Baked, Layer, mask_files, texels_per_metre};
 use crate::camera::CameraFrame;
 use crate::cli::exit::Failure;
 use crate::files::OutputFolder;
@@ -20,6 +20,7 @@ use crate::progress::Silent;
 use crate::tone_map::ToneMap;
 use glam::DVec3;
 use luxel_scenes::{Camera, FieldOfView, GltfOrigin, Projection, Rgb, Scene, UnitSystem};
+use luxel_solver::bounces::Bounces;
 use luxel_solver::world::World;
 use rayon::prelude::*;
 
@@ -37,6 +38,7 @@ pub(super) struct Delivery<'a> {
     pub(super) corners: Option<&'a [Weights]>,
     pub(super) baked: &'a Baked,
     pub(super) target: Target,
+    pub(super) bounces: Bounces,
     pub(super) seed: u64,
 }
 
@@ -65,6 +67,7 @@ impl Delivery<'_> {
                 patches: layer.patches,
             });
         }
+        let masks = mask_files::write(self.folder, atlas, &self.baked.masks)?;
         let mut described = described.into_iter();
         let Some(lightmap) = described.next() else {
             unreachable!("something is included");
@@ -90,7 +93,8 @@ impl Delivery<'_> {
         let tone_map = ToneMap::automatic(&preview);
         self.folder
             .write("preview.png", &png::encode(&preview, tone_map)?)?;
-        let manifest = self.manifest(lightmap, described.collect(), f64::from(tone_map.exposure));
+        let exposure = f64::from(tone_map.exposure);
+        let manifest = self.manifest(lightmap, described.collect(), masks, exposure);
         if let Some((name, text)) = self.target.snippet() {
             let exposure = manifest.bevy.map_or(1.0, |bevy| bevy.lightmap_exposure);
             let text = text.replace("{lightmap_exposure}", &format!("{exposure:?}"));
@@ -117,9 +121,10 @@ impl Delivery<'_> {
     /// Writes the files of a set of maps.
     fn write_maps(&self, layer: &Layer, pages: &[Page]) -> Result<(), Failure> {
         let Finished { raw, map } = &layer.maps;
-        let factor = match layer.include {
-            Include::Ao => 1.0,
-            Include::All | Include::Direct | Include::Indirect => self.target.quantity().factor(),
+        let factor = if layer.include.is_light() {
+            self.target.quantity().factor()
+        } else {
+            1.0
         };
         let scaled =
             |values: &[Rgb]| -> Vec<Rgb> { values.iter().map(|value| *value * factor).collect() };
@@ -173,6 +178,7 @@ impl Delivery<'_> {
         &self,
         lightmap: manifest::Layer,
         others: Vec<manifest::Layer>,
+        masks: Vec<manifest::Masks>,
         exposure: f64,
     ) -> Manifest {
         let Baked { atlas, .. } = self.baked;
@@ -196,6 +202,11 @@ impl Delivery<'_> {
             exposure,
             lightmap,
             others,
+            masks,
+            bounces: match self.bounces {
+                Bounces::All => None,
+                Bounces::AtMost(most) => Some(most),
+            },
             atlas: Sampling {
                 width: atlas.size[0],
                 height: atlas.size[1],

@@ -3,13 +3,15 @@
 use super::{Bake, Include};
 use crate::cli::Context;
 use crate::cli::exit::Failure;
-use crate::cli::footprint::{Footprint, larger_error};
+use crate::cli::footprint::{Footprint, larger_error, largest};
 use crate::cli::goal::Goal;
 use crate::cli::steering::first_error;
+use crate::film::Film;
 use crate::image::exr::Picture;
 use crate::lightmap::atlas::Atlas;
 use crate::lightmap::luxels::{self, Luxel};
 use crate::lightmap::map::Lightmap;
+use crate::lightmap::masks::Mask;
 use luxel_solver::adaptive;
 use luxel_solver::gather::{Components, Gathered};
 use luxel_solver::world::{Receiver, World};
@@ -23,7 +25,10 @@ impl Bake {
                 Some(Components::All | Components::Indirect)
             )
         };
-        if self.include.iter().any(has_indirect) {
+        if self.include.iter().any(has_indirect)
+            && !self.is_traced()
+            && self.reflections.bounces().reflect()
+        {
             adaptive::first_patches(error)
         } else {
             0
@@ -37,41 +42,77 @@ impl Bake {
         world: &World<'_>,
         atlas: &Atlas,
         luxels: usize,
+        masks: usize,
         goal: &Goal,
         context: &Context<'_>,
     ) -> Result<Footprint, Failure> {
-        let texels = atlas.texels();
         let page = atlas.size[0] * atlas.size[1];
-        let found = luxels * (size_of::<Luxel>() + size_of::<Receiver>() + size_of::<Gathered>());
-        let held = Footprint::of(world)
-            .with("luxels", found.max(luxels::bytes_to_find(texels)))
-            .with(
-                "what is gathered at them",
-                adaptive::bytes_to_gather(luxels),
-            )
-            .with(
-                "maps",
-                2 * self.include.len() * Lightmap::bytes_for(texels)
-                    + 2 * Picture::bytes_for(page, 1),
-            );
-        let with_mesh = |error: f64| {
+        let held = self.held(world, [atlas.texels(), page, luxels], masks);
+        let with_mesh = |held: &Footprint, error: f64| {
             let patches = self.first_patches(error);
-            let solving = adaptive::bytes_to_solve(patches, world.scene());
+            let solving =
+                adaptive::bytes_to_solve(patches, self.reflections.bounces(), world.scene());
             held.with(
                 "patches and their solutions",
                 if patches > 0 { solving } else { 0 },
             )
         };
         let error = first_error(Some(goal));
-        with_mesh(error).require(context, || {
+        with_mesh(&held, error).require(context, || {
             let limit = context.common.max_memory;
-            larger_error(error, |error| with_mesh(error).fits(limit)).or_else(|| {
-                let fits = limit.map_or(0, |limit| limit.0.get()) as f64;
-                let share = (fits / with_mesh(error).total() as f64).sqrt();
-                let side = (atlas.size[0] as f64 * share) as usize / 4 * 4;
-                (side >= 16 && atlas.pages == 1).then(|| format!("about --size {side}"))
+            larger_error(error, |error| with_mesh(&held, error).fits(limit)).or_else(|| {
+                // On a smaller page charts cover more of the texels: at most all.
+                let fits = |quarter: usize| {
+                    let texels = (4 * quarter).pow(2);
+                    let held = self.held(world, [texels; 3], masks);
+                    with_mesh(&held, error).fits(limit)
+                };
+                let quarter = largest(4, atlas.size[0] / 4 - 1, fits)?;
+                (atlas.pages == 1).then(|| format!("--size {}", 4 * quarter))
             })
         })?;
         Ok(held)
     }
+
+    /// What is held besides patches, with so many texels in all, texels of a page, and luxels.
+    fn held(
+        &self,
+        world: &World<'_>,
+        [texels, page, luxels]: [usize; 3],
+        masks: usize,
+    ) -> Footprint {
+        let gathers = |include: &Include| match include {
+            Include::Ao => false,
+            Include::Sky | Include::Masks => true,
+            Include::All | Include::Direct | Include::Indirect => !self.is_traced(),
+        };
+        let gathered = if self.include.iter().any(gathers) {
+            adaptive::bytes_to_gather(luxels)
+        } else {
+            0
+        };
+        let sampled = if self.include.iter().all(gathers) {
+            0
+        } else {
+            Film::bytes_to_refine(luxels)
+        };
+        let found = luxels * (size_of::<Luxel>() + size_of::<Receiver>() + size_of::<Gathered>());
+        let layers = self.include.len() - usize::from(masks > 0);
+        Footprint::of(world)
+            .with("luxels", found.max(luxels::bytes_to_find(texels)))
+            .with("what is gathered at them", gathered.max(sampled))
+            .with(
+                "maps",
+                2 * layers * Lightmap::bytes_for(texels) + 2 * Picture::bytes_for(page, 1),
+            )
+            .with("masks", bytes_of_masks(texels, masks))
+    }
+}
+
+/// Masks of so many lights, and the maps that the last of them is made from.
+fn bytes_of_masks(texels: usize, lights: usize) -> usize {
+    if lights == 0 {
+        return 0;
+    }
+    Mask::bytes_for(texels, lights) + 2 * Lightmap::bytes_for(texels)
 }

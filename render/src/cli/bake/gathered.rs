@@ -1,4 +1,4 @@
-//! What luxels see: light by the final gather, or how open they are.
+//! What luxels see: light by the final gather or by paths, or how open they are.
 
 use super::Bake;
 use crate::cli::Context;
@@ -9,8 +9,9 @@ use crate::cli::goal::Goal;
 use crate::cli::refine::{Refined, refine};
 use crate::cli::stated::StatedError;
 use crate::cli::steering::{Steering, first_error};
-use crate::film::{Alike, Film};
-use crate::integrators::ao::{AmbientOcclusion, Config};
+use crate::film::{Alike, Film, PixelError};
+use crate::integrators::ao::AmbientOcclusion;
+use crate::integrators::path::PathTracer;
 use crate::lightmap::bake::{self, Luxels};
 use crate::progress::Progress;
 use luxel_scenes::Irradiance;
@@ -21,6 +22,10 @@ use luxel_solver::world::World;
 /// Rays of a sample of ambient occlusion, and the samples of each replicate that are begun with.
 const AO_RAYS: u32 = 4;
 const FIRST_AO_SAMPLES: u32 = 2;
+
+/// Paths of each replicate that are begun with: with fewer, the rare bright ones that make the noise are seen by too few luxels to
+/// tell it.
+const FIRST_PATHS: u32 = 16;
 
 impl Bake {
     /// Light; `None` when it was stopped before there was any.
@@ -36,10 +41,12 @@ impl Bake {
     ) -> Result<Option<AtLuxels>, Failure> {
         let error = first_error(Some(goal));
         let first = self.first_patches(error);
+        let bounces = self.reflections.bounces();
         let config = AdaptiveConfig {
             error,
             components,
-            most_patches: held.most_patches(world.scene(), first, context),
+            bounces,
+            most_patches: held.most_patches(world.scene(), first, bounces, context),
             seed: context.common.seed,
         };
         let mut steering = Steering::new(context, Some(goal)).keeping(keeper);
@@ -69,6 +76,34 @@ impl Bake {
         }))
     }
 
+    /// Light by paths; `None` when it was stopped before there was any.
+    pub(super) fn traced<'r>(
+        &self,
+        world: &World<'_>,
+        luxels: &Luxels,
+        components: Components,
+        goal: &Goal,
+        keeper: &Keeper<'_, 'r>,
+        context: &Context<'r>,
+    ) -> Option<AtLuxels> {
+        let receivers = &luxels.lit.receivers;
+        let bounces = self.reflections.bounces();
+        let tracer = PathTracer::new(world, context.common.seed).with_bounces(bounces);
+        let add = |film: &mut Film, paths: &[u32], progress: &dyn Progress| {
+            tracer.irradiance(film, receivers, components, paths, progress);
+        };
+        let alike = |_| Alike::Values;
+        sampled(
+            receivers.len(),
+            FIRST_PATHS,
+            alike,
+            goal,
+            keeper,
+            context,
+            add,
+        )
+    }
+
     /// Ambient occlusion; `None` when it was stopped before there was any.
     pub(super) fn occlusion<'r>(
         &self,
@@ -79,43 +114,54 @@ impl Bake {
         context: &Context<'r>,
     ) -> Option<AtLuxels> {
         let receivers = &luxels.lit.receivers;
-        let config = Config {
-            rays: AO_RAYS,
-            max_distance: self.max_distance,
-            falloff: self.falloff,
-            seed: context.common.seed,
-        };
-        let occlusion = AmbientOcclusion::new(world, config);
+        let occlusion =
+            AmbientOcclusion::new(world, self.reach.config(AO_RAYS, context.common.seed));
         let add = |film: &mut Film, samples: &[u32], progress: &dyn Progress| {
             occlusion.at_receivers(film, receivers, samples, progress);
         };
-        let mut steering = Steering::new(context, Some(goal)).keeping(keeper);
-        let start = match keeper.current() {
-            Some(Current::Film(refined)) => refined,
-            _ => Refined::first(
-                Film::new([receivers.len(), 1], MAX_REPLICATES as u32),
-                FIRST_AO_SAMPLES,
-            ),
+        let alike = |samples| Alike::Fractions {
+            rays: samples * AO_RAYS,
         };
-        let (film, error) = refine(start, Alike::Values, Some(goal), &mut steering, add)?;
-        let rays = film.sample_counts().max * AO_RAYS;
-        let errors = film.errors(Alike::Fractions { rays })?;
-        // Openness has a value and a noise, as direct light has.
-        let value = |(value, error): (_, &crate::film::PixelError)| Gathered {
-            direct: Irradiance(value),
-            direct_noise: Irradiance(error.total()),
-            ..Gathered::default()
-        };
-        if self.max_distance.is_none() && film.values().all(|value| value.max_element() <= 0.0) {
+        let (count, first) = (receivers.len(), FIRST_AO_SAMPLES);
+        let found = sampled(count, first, alike, goal, keeper, context, add)?;
+        let is_black = |gathered: &Gathered| gathered.direct.0.max_element() <= 0.0;
+        if !self.reach.is_limited() && found.values.iter().all(is_black) {
             context.reporter.warning(
                 "nothing is open to the outside: without --max-distance ambient occlusion is black in a closed room",
             );
         }
-        Some(AtLuxels {
-            values: film.values().zip(&errors).map(value).collect(),
-            stated: StatedError::of_samples(error.sampling, error.discretisation, 0.0),
-            energy: None,
-            patches: 0,
-        })
+        Some(found)
     }
+}
+
+/// Values of independent samples at so many receivers, `first` of each replicate to begin with; `None` when it was stopped before
+/// there was any. `alike` tells how noise is judged where each has so many samples.
+fn sampled<'r>(
+    receivers: usize,
+    first: u32,
+    alike: impl Fn(u32) -> Alike,
+    goal: &Goal,
+    keeper: &Keeper<'_, 'r>,
+    context: &Context<'r>,
+    add: impl FnMut(&mut Film, &[u32], &dyn Progress),
+) -> Option<AtLuxels> {
+    let mut steering = Steering::new(context, Some(goal)).keeping(keeper);
+    let start = match keeper.current() {
+        Some(Current::Film(refined)) => refined,
+        _ => Refined::first(Film::new([receivers, 1], MAX_REPLICATES as u32), first),
+    };
+    let (film, error) = refine(start, Alike::Values, Some(goal), &mut steering, add)?;
+    let errors = film.errors(alike(film.sample_counts().max))?;
+    // A sample has a value and a noise, as direct light has.
+    let value = |(value, error): (_, &PixelError)| Gathered {
+        direct: Irradiance(value),
+        direct_noise: Irradiance(error.total()),
+        ..Gathered::default()
+    };
+    Some(AtLuxels {
+        values: film.values().zip(&errors).map(value).collect(),
+        stated: StatedError::of_samples(error.sampling, error.discretisation, 0.0),
+        energy: None,
+        patches: 0,
+    })
 }

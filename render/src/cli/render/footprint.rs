@@ -65,7 +65,7 @@ impl Render {
     ) -> usize {
         let first = self.first_patches(first_error(goal), goal);
         let held = self.footprint(world, frame.size(), goal);
-        held.most_patches(world.scene(), first, context)
+        held.most_patches(world.scene(), first, self.reflections.bounces(), context)
     }
 
     /// Whether a view of so many patches fits; says so where not.
@@ -93,7 +93,9 @@ impl Render {
         let written = Film::bytes_for(pixels) + Picture::bytes_for(pixels, LAYERS);
         let film = written.max(goal.map_or(0, |_| Film::bytes_to_refine(pixels)));
         let held = Footprint::of(world);
-        if goal.is_none() || !matches!(self.integrator, Method::Gather | Method::Whitted) {
+        let has_field = matches!(self.integrator, Method::Gather | Method::Whitted)
+            && self.reflections.bounces().reflect();
+        if goal.is_none() || !has_field {
             return held.with("film and picture", film);
         }
         let [columns, rows] = receivers(size);
@@ -114,6 +116,7 @@ impl Render {
         match self.integrator {
             Method::Radiosity => VIEW_PATCHES,
             Method::Path | Method::Ao => 0,
+            _ if !self.reflections.bounces().reflect() => 0,
             Method::Gather | Method::Whitted if goal.is_none() => GATHER_PATCHES,
             Method::Gather | Method::Whitted => adaptive::first_patches(error),
         }
@@ -124,7 +127,7 @@ impl Render {
         match self.integrator {
             _ if patches == 0 => 0,
             Method::Radiosity => Transport::bytes_to_view(patches, world.scene()),
-            _ => adaptive::bytes_to_solve(patches, world.scene()),
+            _ => adaptive::bytes_to_solve(patches, self.reflections.bounces(), world.scene()),
         }
     }
 }

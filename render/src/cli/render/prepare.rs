@@ -11,6 +11,7 @@ use crate::integrators::{Vertex, cast};
 use glam::DVec2;
 use luxel_scenes::Rgb;
 use luxel_solver::adaptive::{Adapted, AdaptiveConfig, FieldGather};
+use luxel_solver::bounces::Bounces;
 use luxel_solver::gather::{Components, IndirectField, Lookup};
 use luxel_solver::sampling::hash;
 use luxel_solver::world::{Receiver, World};
@@ -48,17 +49,27 @@ pub(super) struct Prepared<'w, 's> {
     pub(super) field_error: Option<f64>,
 }
 
+/// How direct light alone is gathered: the rays find the sky, and emission that is not a source.
+pub(super) fn of_direct_light(seed: u64) -> gather::Config {
+    gather::Config {
+        rays: REFINED_GATHER_RAYS,
+        shadow_rays: SHADOW_RAYS,
+        seed,
+    }
+}
+
 /// Solutions of `most_patches` at most that are good enough for the goal at what the camera sees, and how to gather from them.
 pub(super) fn prepare<'w, 's>(
     world: &'w World<'s>,
     frame: &CameraFrame,
     most_patches: usize,
+    bounces: Bounces,
     goal: Option<&Goal>,
     context: &Context<'_>,
 ) -> Result<Option<Prepared<'w, 's>>, Failure> {
     let seed = context.common.seed;
     let mut steering = Steering::new(context, goal);
-    let scene = Adapted::new(world, seed)?;
+    let scene = Adapted::new(world, bounces, seed)?;
     let mut config = gather::Config {
         rays: GATHER_RAYS,
         shadow_rays: SHADOW_RAYS,
@@ -78,6 +89,7 @@ pub(super) fn prepare<'w, 's>(
     let wanted = AdaptiveConfig {
         error: first_error(goal),
         components: Components::All,
+        bounces,
         most_patches,
         seed,
     };

@@ -1,0 +1,772 @@
+//! What lightmaps can hold, and how its light is computed: the sky alone, shadow masks, counted bounces, paths.
+
+use glam::DVec3;
+use luxel::cli::ExitCode;
+use luxel::film::{Alike, Film};
+use luxel::image::exr;
+use luxel::integrators::path::PathTracer;
+use luxel::lightmap::bake::Luxels;
+use luxel::lightmap::manifest::Manifest;
+use luxel::lightmap::masks::{unoccluded, visible};
+use luxel::progress::Silent;
+use luxel_scenes::{
+    Intensity, Irradiance, Light, LightKind, Material, Radiance, Reflectance, Rgb, Scene, Sky,
+};
+use luxel_solver::bounces::Bounces;
+use luxel_solver::direct::Lights;
+use luxel_solver::form_factors::point_to_polygon;
+use luxel_solver::gather::{Components, Gathered, MAX_REPLICATES};
+use luxel_solver::world::World;
+use luxel_tests::builder::{Part, Polygon, flipped, parallelogram, room, scene, solid_box};
+use luxel_tests::command::{arg, luxel};
+use luxel_tests::hypothesis::{Comparison, z_test};
+use luxel_tests::lightmaps::{atlas, gathered};
+use luxel_tests::picture::{example, render};
+use luxel_tests::probe::Probe;
+use luxel_tests::scene_files;
+use std::f64::consts::PI;
+use std::path::Path;
+
+fn v(x: f64, y: f64, z: f64) -> DVec3 {
+    DVec3::new(x, y, z)
+}
+
+/// Adds a uniform sky of radiance 1 above the horizon.
+fn push_sky(scene: &mut Scene) {
+    let kind = LightKind::Sky {
+        sky: Sky::Uniform {
+            radiance: Radiance::splat(1.0),
+        },
+        up: DVec3::Y,
+        ground: Radiance::ZERO,
+    };
+    push_light(scene, "sky", kind);
+}
+
+fn push_light(scene: &mut Scene, name: &str, kind: LightKind) {
+    let name = name.into();
+    scene.lights.push(Light { name, kind });
+}
+
+/// A floor of 4 × 4 m about the origin, facing up.
+fn floor() -> Polygon {
+    parallelogram(v(-2.0, 0.0, -2.0), DVec3::Z * 4.0, DVec3::X * 4.0)
+}
+
+/// The luxels of one page of a scene, in metres, with what is asked of them.
+struct Places<'s> {
+    world: World<'s>,
+    luxels: Luxels,
+}
+
+impl<'s> Places<'s> {
+    fn new(scene: &'s Scene, side: usize) -> Self {
+        let world = World::new(scene);
+        let luxels = Luxels::new(&world, &atlas(scene, side), 0.5);
+        Self { world, luxels }
+    }
+
+    /// Positions in metres and normals.
+    fn points(&self) -> Vec<(DVec3, DVec3)> {
+        let frame = self.world.surfaces().geometry().frame();
+        let receivers = self.luxels.lit.receivers.iter();
+        receivers
+            .map(|receiver| (frame.to_world(receiver.position), receiver.normal))
+            .collect()
+    }
+}
+
+/// Compares means of groups of consecutive luxels, whose noise is their own and evens out, with what is expected of
+/// them; and the errors of single luxels with those that are stated, root mean square.
+fn agree(found: &[Gathered], expected: &[f64], group: usize, known_to: f64) -> Result<f64, String> {
+    let pairs: Vec<(f64, f64, f64)> = found
+        .iter()
+        .zip(expected)
+        .map(|(g, &e)| (g.irradiance().0.x, g.standard_error().0.x, e))
+        .collect();
+    let comparisons: Vec<Comparison> = pairs
+        .chunks_exact(group)
+        .map(|group| {
+            let count = group.len() as f64;
+            let mean = |of: fn(&(f64, f64, f64)) -> f64| group.iter().map(of).sum::<f64>() / count;
+            let square = mean(|(_, error, _)| error * error) / count;
+            let expected = mean(|(.., expected)| *expected);
+            let value = mean(|(value, ..)| *value);
+            Comparison {
+                value,
+                standard_error: square.sqrt(),
+                expected: value.clamp(expected - known_to, expected + known_to),
+            }
+        })
+        .collect();
+    let noisy = pairs.iter().filter(|(_, error, _)| *error > 0.0);
+    let z = |(value, error, expected): &(f64, f64, f64)| (value - expected) / error;
+    let squares: f64 = noisy.clone().map(|pair| z(pair).powi(2)).sum();
+    let ratio = (squares / noisy.clone().count().max(1) as f64).sqrt();
+    let worst = noisy.max_by(|a, b| z(a).abs().total_cmp(&z(b).abs()));
+    println!("errors over stated ones {ratio}, worst {worst:?}");
+    z_test(&comparisons)?;
+    Ok(ratio)
+}
+
+/// Under a uniform sky of radiance 1 an open plane receives π, exactly: no ray is blocked and all see the same. It is part of direct
+/// light, here all of it, and of all light.
+#[test]
+fn the_sky_over_an_open_plane_is_pi() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let plane = scene("plane", [Part::grey("plane", 0.5, vec![floor()])]);
+    let sky = "[[light]]\nkind = \"sky\"\nmodel = \"uniform\"\nradiance = 1\n";
+    let file = scene_files::write(&plane, folder.path(), sky);
+    let out = folder.path().join("out");
+    let include = ["--include", "all,sky,direct"];
+    let options = ["bake", arg(&file), "-o", arg(&out), "--size", "32", "-q"];
+    luxel(&[&options[..], &include[..]].concat()).assert_success();
+    for name in ["lightmap", "sky", "direct"] {
+        let map = exr::read(&out.join(format!("{name}_000.exr"))).expect("a map");
+        for value in map.image.pixels.iter().flatten() {
+            // Single precision in the file; sums of some hundred terms before.
+            let relative = f64::from(*value) / PI - 1.0;
+            assert!(relative.abs() <= f64::from(f32::EPSILON), "{name}: {value}");
+        }
+    }
+    let manifest = manifest(&out);
+    let named: Vec<&str> = manifest
+        .others
+        .iter()
+        .map(|layer| layer.include.as_str())
+        .collect();
+    assert_eq!(named, ["sky", "direct"]);
+    assert!(
+        manifest.others[0].error.total <= 1e-7,
+        "nothing is uncertain"
+    );
+}
+
+fn manifest(folder: &Path) -> Manifest {
+    let text = std::fs::read_to_string(folder.join("manifest.json")).expect("a manifest");
+    serde_json::from_str(&text).expect("a manifest")
+}
+
+/// A wall of height h at a distance d, of no end to both sides, leaves π L (1 + cos α)/2 of a uniform sky with tan α = h/d; the stated
+/// errors of luxels are about those that there are. The lamp in the scene does not count.
+#[test]
+fn a_wall_hides_its_share_of_the_sky() {
+    /// Half the length of the wall. What lies beyond would cover (x / FAR)² of the hemisphere at most.
+    const FAR: f64 = 300.0;
+    const HEIGHT: f64 = 1.5;
+    let wall = parallelogram(
+        v(-2.0, 0.0, -FAR),
+        DVec3::Y * HEIGHT,
+        DVec3::Z * (2.0 * FAR),
+    );
+    let lamp = parallelogram(v(0.0, 3.0, 0.0), DVec3::X * 0.1, DVec3::Z * 0.1);
+    let mut scene = scene(
+        "wall",
+        [
+            Part::grey("floor", 0.5, vec![floor()]),
+            Part::grey("wall", 0.0, vec![wall]),
+            Part::lamp("lamp", 10.0, vec![lamp]),
+        ],
+    );
+    scene.objects[1].lightmap_scale = 0.0;
+    scene.objects[2].lightmap_scale = 0.0;
+    push_sky(&mut scene);
+    let places = Places::new(&scene, 32);
+    let sky = places.world.lit_by(Lights::sky_of(&scene));
+    let found = gathered(
+        &sky,
+        &places.luxels,
+        Components::Direct,
+        Bounces::All,
+        0.01,
+        3,
+    );
+    let exact = |(position, _): &(DVec3, DVec3)| {
+        let distance = position.x + 2.0;
+        PI * (1.0 + distance / distance.hypot(HEIGHT)) / 2.0
+    };
+    let expected: Vec<f64> = places.points().iter().map(exact).collect();
+    assert!(found.len() > 700, "{} luxels", found.len());
+    let known_to = PI * (4.0 / FAR).powi(2);
+    let ratio = agree(&found, &expected, 32, known_to).expect("the sky above a wall");
+    assert!((0.5..=1.5).contains(&ratio), "{ratio}");
+}
+
+/// A rectangular lamp half hidden by a straight edge: a point sees the part of the lamp beyond the plane through itself and the edge, and
+/// V is Lambert's irradiance from that part over that from the whole. Below the horizon of the lamp's own face, and behind it, V is 0.
+#[test]
+fn masks_have_the_penumbra_of_a_straight_edge() {
+    const LAMP: f64 = 2.0;
+    const EDGE: f64 = 1.0;
+    let lamp_from = |x: f64| parallelogram(v(x, LAMP, -0.5), DVec3::X * (0.5 - x), DVec3::Z);
+    // The blade reaches far enough to both sides that no ray to the lamp goes around it.
+    let blade = parallelogram(v(-9.0, EDGE, -9.0), DVec3::Z * 18.0, DVec3::X * 9.0);
+    let mut scene = scene(
+        "edge",
+        [
+            Part::grey("floor", 0.5, vec![floor()]),
+            Part::grey("blade", 0.0, vec![blade.clone(), flipped(blade)]),
+            Part::lamp("lamp", 10.0, vec![lamp_from(-0.5)]),
+        ],
+    );
+    scene.objects[1].lightmap_scale = 0.0;
+    let places = Places::new(&scene, 64);
+    let named = places.world.lights().named(&scene);
+    assert_eq!(named.len(), 1);
+    let lit = places
+        .world
+        .lit_by(places.world.lights().only(&named[0].sources));
+    let light = gathered(
+        &lit,
+        &places.luxels,
+        Components::Direct,
+        Bounces::AtMost(0),
+        0.01,
+        5,
+    );
+    let whole = unoccluded(&lit, &places.luxels.lit.receivers);
+    let found = visible(&light, &whole);
+    let exact = |&(position, normal): &(DVec3, DVec3)| {
+        if normal.y < 0.5 || position.y > 0.5 {
+            return 0.0;
+        }
+        // Where the line from the point over the edge, which runs along z at x = 0, meets the plane of the lamp.
+        let from = position.x - position.x * LAMP / EDGE;
+        let share = |from: f64| {
+            if from < 0.5 {
+                point_to_polygon(position, normal, &lamp_from(from.max(-0.5)))
+            } else {
+                0.0
+            }
+        };
+        share(from) / share(-0.5)
+    };
+    let expected: Vec<f64> = places.points().iter().map(exact).collect();
+    let partial = expected.iter().filter(|e| **e > 0.0 && **e < 1.0).count();
+    assert!(partial > 300, "{partial} luxels in the penumbra");
+    // With the rays that a penumbra gets the sampler's means are ratios, whose bias is below a thousandth.
+    let ratio = agree(&found, &expected, 24, 1e-3).expect("the penumbra of an edge");
+    assert!((0.5..=1.5).contains(&ratio), "{ratio}");
+    // Outside of the penumbra nothing is uncertain.
+    for (found, expected) in found.iter().zip(&expected) {
+        if *expected == 0.0 {
+            assert!(found.direct.0.x == 0.0, "{found:?}");
+        } else if *expected == 1.0 {
+            assert!((found.direct.0.x - 1.0).abs() < 1e-12, "{found:?}");
+        }
+    }
+}
+
+/// A room with a lamp, a point light, a spot and a sun through a window, and a box that casts shadows.
+fn many_lights() -> Scene {
+    let mut faces = room(DVec3::ZERO, v(3.0, 2.0, 3.0));
+    // Without the wall at z+, through which the sun shines.
+    faces.pop();
+    let lamp = parallelogram(v(0.5, 1.99, 0.5), DVec3::X * 0.6, DVec3::Z * 0.6);
+    let other = parallelogram(v(2.2, 1.98, 0.5), DVec3::X * 0.4, DVec3::Z * 0.4);
+    let mut scene = scene(
+        "lights",
+        [
+            Part::grey("room", 0.5, faces),
+            Part::grey("box", 0.5, solid_box(v(1.0, 0.0, 1.0), v(1.7, 0.8, 1.6))),
+            Part::lamp("lamp", 5.0, vec![lamp]),
+            Part::lamp("other", 5.0, vec![other]),
+        ],
+    );
+    push_light(
+        &mut scene,
+        "bulb",
+        LightKind::Point {
+            position: v(0.4, 1.2, 0.4),
+            intensity: Intensity::new(1.0, 0.8, 0.5),
+        },
+    );
+    push_light(
+        &mut scene,
+        "spot",
+        LightKind::Spot {
+            position: v(2.5, 1.8, 2.5),
+            direction: v(-1.0, -1.5, -1.0).normalize(),
+            intensity: Intensity::splat(3.0),
+            inner_angle: 0.3,
+            outer_angle: 0.5,
+        },
+    );
+    push_light(
+        &mut scene,
+        "sun",
+        LightKind::Directional {
+            direction: v(0.3, -1.0, -1.2).normalize(),
+            irradiance: Irradiance::splat(2.0),
+        },
+    );
+    scene
+}
+
+/// Σ V E⁰ over all lights is the direct light: by luxels without noise exactly, by groups of the others within what is stated.
+#[test]
+fn masks_add_up_to_direct_light() {
+    let scene = many_lights();
+    let places = Places::new(&scene, 64);
+    let receivers = &places.luxels.lit.receivers;
+    let direct = gathered(
+        &places.world,
+        &places.luxels,
+        Components::Direct,
+        Bounces::All,
+        0.01,
+        1,
+    );
+    let named = places.world.lights().named(&scene);
+    assert_eq!(named.len(), 5);
+    let mut sum = vec![Gathered::default(); receivers.len()];
+    for (seed, light) in (10..).zip(&named) {
+        let lit = places
+            .world
+            .lit_by(places.world.lights().only(&light.sources));
+        let whole = unoccluded(&lit, receivers);
+        let of_light = gathered(
+            &lit,
+            &places.luxels,
+            Components::Direct,
+            Bounces::AtMost(0),
+            0.01,
+            seed,
+        );
+        let shares = visible(&of_light, &whole);
+        for (((sum, share), whole), receiver) in
+            sum.iter_mut().zip(&shares).zip(&whole).zip(receivers)
+        {
+            // What an engine does: the irradiance that it computes itself, by channel, times the share.
+            let own: Rgb = lit
+                .lights()
+                .sources()
+                .iter()
+                .map(|source| source.irradiance(receiver.position, receiver.normal))
+                .sum();
+            assert!((own.element_sum() - whole).abs() <= 1e-12 * whole);
+            sum.direct.0 += own * share.direct.0;
+            let noise = own * share.direct_noise.0;
+            let before = sum.direct_noise.0;
+            sum.direct_noise.0 = (before * before + noise * noise).map(f64::sqrt);
+            if light.name == "bulb" || light.name == "sun" || light.name == "spot" {
+                assert!([0.0, 1.0].contains(&share.direct.0.x.round()));
+                assert!((share.direct.0.x - share.direct.0.x.round()).abs() < 1e-12);
+                assert_eq!(share.direct_noise.0, Rgb::ZERO);
+            }
+        }
+    }
+    let mut comparisons = Vec::new();
+    for (sum, direct) in sum.chunks(32).zip(direct.chunks(32)) {
+        let mean =
+            |of: &dyn Fn(usize) -> f64| (0..sum.len()).map(of).sum::<f64>() / sum.len() as f64;
+        let square =
+            |i: usize| sum[i].direct_noise.0.x.powi(2) + direct[i].direct_noise.0.x.powi(2);
+        // Means of groups; sums of five and of some thirty terms are rounded.
+        let expected = mean(&|i| direct[i].direct.0.x);
+        let value = mean(&|i| sum[i].direct.0.x);
+        comparisons.push(Comparison {
+            value: if (value - expected).abs() <= 1e-9 {
+                expected
+            } else {
+                value
+            },
+            standard_error: (mean(&square) / sum.len() as f64).sqrt(),
+            expected,
+        });
+    }
+    z_test(&comparisons).expect("sums of shares are direct light");
+}
+
+/// Masks as files: five lights in two pictures, named, between 0 and 1; channels without a light hold 1.
+#[test]
+fn masks_are_delivered_four_lights_a_picture() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let lights = "[[light]]\nkind = \"point\"\nname = \"bulb\"\nposition = [0.4, 1.2, 0.4]\nwatts_per_steradian = 1\n\
+                  [[light]]\nkind = \"directional\"\nname = \"sun\"\ndirection = [0.3, -1, -1.2]\nwatts_per_square_metre = 2\n";
+    let mut scene = many_lights();
+    for x in [0.2, 1.4] {
+        let name = if x < 1.0 { "third" } else { "fourth" };
+        let object = scene.push_object(name);
+        let lamp = Material::diffuse(name, Reflectance::ZERO).with_emission(Radiance::splat(1.0));
+        let material = scene.push_material(lamp);
+        let face = parallelogram(v(x, 1.97, 2.0), DVec3::X * 0.3, DVec3::Z * 0.3);
+        scene.push_face(&face, object, material);
+    }
+    let file = scene_files::write(&scene, folder.path(), lights);
+    let bake = |out: &Path, threads: &str| {
+        let options = ["bake", arg(&file), "-o", arg(out), "--size", "64", "-q"];
+        let more = ["--include", "direct,masks", "--error", "2%", "-j", threads];
+        luxel(&[&options[..], &more[..]].concat()).assert_success();
+    };
+    let [one, two] = ["one", "two"].map(|name| folder.path().join(name));
+    bake(&one, "1");
+    bake(&two, "2");
+    let manifest = manifest(&one);
+    let names: Vec<Vec<String>> = manifest
+        .masks
+        .iter()
+        .map(|set| {
+            let lights = set.lights.iter();
+            lights
+                .map(|light| format!("{} {} {}", light.channel, light.kind, light.name))
+                .collect()
+        })
+        .collect();
+    assert_eq!(
+        names,
+        [
+            vec![
+                "R point bulb",
+                "G directional sun",
+                "B surface lamp",
+                "A surface other"
+            ],
+            vec!["R surface third", "G surface fourth"],
+        ]
+    );
+    for set in &manifest.masks {
+        for (channel, light) in ["R", "G", "B", "A"]
+            .iter()
+            .zip(set.lights.iter().map(Some).chain([None; 4]))
+        {
+            let page = &set.pages[0];
+            let values = exr::read_channel(&one.join(&page.file), channel).expect("a channel");
+            assert!(values.iter().all(|v| (0.0..=1.0).contains(v)));
+            let Some(light) = light else {
+                assert!(values.iter().all(|v| *v == 1.0), "nothing is hidden");
+                continue;
+            };
+            let errors = exr::read_channel(&one.join(&page.luxels), &format!("error.{channel}"));
+            let errors = errors.expect("errors");
+            let lit = manifest.atlas.lit as f64;
+            let square: f64 = errors.iter().map(|e| f64::from(*e).powi(2)).sum();
+            let rms = (square / lit).sqrt();
+            // Single precision in the file.
+            assert!(
+                (rms - light.error.luxels).abs() <= 1e-6 * rms,
+                "{rms} {light:?}"
+            );
+            assert!(rms <= 0.02, "as asked: {rms}");
+            assert_eq!(rms == 0.0, light.kind != "surface", "{light:?}");
+            let seen = values.iter().filter(|v| **v > 0.5).count();
+            assert!(seen > 100, "{light:?} is seen by {seen} texels");
+        }
+        for page in &set.pages {
+            for name in [&page.file, &page.error, &page.luxels] {
+                let [one, two] = [&one, &two].map(|folder| std::fs::read(folder.join(name)));
+                assert!(one.expect("a file") == two.expect("a file"), "{name}");
+            }
+        }
+    }
+}
+
+/// The furnace of emission π and reflectance 1/2: E after at most N bounces is π Σ 2^−k, in maps, at points by both methods, and in
+/// pictures, where L = 1 + E / 2π.
+#[test]
+fn bounces_are_a_geometric_series() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = example("furnace");
+    let points = folder.path().join("points.csv");
+    std::fs::write(
+        &points,
+        "x,y,z,nx,ny,nz\n0.7,0,0.4,0,1,0\n1,1,1,0.6,0.8,0\n",
+    )
+    .expect("a table");
+    for bounces in 0..=4 {
+        let expected = PI * (0..=bounces).map(|k| 0.5_f64.powi(k)).sum::<f64>();
+        let number = bounces.to_string();
+        let out = folder.path().join(&number);
+        let common = ["--bounces", &number, "-q"];
+        let bake = ["bake", arg(&file), "-o", arg(&out), "--size", "64"];
+        luxel(&[&bake[..], &common[..]].concat()).assert_success();
+        let map = exr::read(&out.join("lightmap_000.exr")).expect("a map");
+        for value in map.image.pixels.iter().flatten() {
+            // What joining and fitting leave of a constant; see the furnace of all bounces.
+            assert!(
+                (f64::from(*value) / expected - 1.0).abs() < 1e-3,
+                "{bounces}: {value}"
+            );
+        }
+        let manifest = manifest(&out);
+        assert_eq!(manifest.bounces, Some(bounces as u32));
+        if bounces > 0 {
+            let energy = manifest.lightmap.energy.expect("a ledger");
+            // Of what 24 m² receive first the next reflection is left out.
+            let left = 24.0 * PI * 0.5_f64.powi(bounces + 1);
+            assert!(
+                (energy.residual[0] / left - 1.0).abs() < 0.01,
+                "{bounces}: {energy:?}"
+            );
+        }
+        for method in ["gather", "path"] {
+            let out = folder.path().join("out.csv");
+            let probe = [
+                "probe",
+                arg(&file),
+                "--points",
+                arg(&points),
+                "-o",
+                arg(&out),
+            ];
+            let method = ["--integrator", method];
+            let found = luxel(&[&probe[..], &method[..], &common[..]].concat());
+            found.assert_success();
+            for estimate in luxel_tests::probe::estimates(&out) {
+                // Paths are noisy only where roulette ends them; 5 standard errors.
+                let allowed = 5.0 * estimate.standard_error.x + 1e-6 * expected;
+                let error = (estimate.value.x - expected).abs();
+                assert!(error <= allowed, "{method:?} {bounces}: {estimate:?}");
+            }
+        }
+        for method in ["gather", "whitted", "path"] {
+            let options = ["--integrator", method, "--size", "16x16", "--spp", "64"];
+            let picture = render(&file, &[&options[..], &["--bounces", &number]].concat());
+            let sum: f64 = picture.image.pixels.iter().map(|p| f64::from(p[0])).sum();
+            let mean = sum / 256.0;
+            let shown = 1.0 + expected / (2.0 * PI);
+            // 16 384 samples; a path's radiance scatters by less than itself.
+            let allowed = if method == "path" {
+                5.0 * shown / 128.0
+            } else {
+                1e-5
+            };
+            assert!(
+                (mean - shown).abs() < allowed,
+                "{method} {bounces}: {mean} for {shown}"
+            );
+        }
+    }
+}
+
+/// In a furnished room and below an open sky gather and paths agree on light of at most one and two bounces, which is less than all.
+#[test]
+fn gather_and_paths_agree_on_every_bounce() {
+    let mut open = many_lights();
+    open.lights.clear();
+    let sky =
+        "[[light]]\nkind = \"sky\"\nmodel = \"uniform\"\nradiance = 1\nground_reflectance = 0.3\n";
+    let points: Vec<(DVec3, DVec3)> = (0..12)
+        .map(|i| (v(0.2 + 0.23 * f64::from(i), 0.0, 0.7), DVec3::Y))
+        .chain((0..6).map(|i| (v(1.35, 0.05 + 0.12 * f64::from(i), 1.6), DVec3::Z)))
+        .collect();
+    for lights in ["", sky] {
+        let mut before: Option<Vec<f64>> = None;
+        let mut comparisons = Vec::new();
+        for bounces in ["1", "2"] {
+            let probe = |method: &str, components: &str, error: &str| {
+                let arguments = [
+                    "--integrator",
+                    method,
+                    "--bounces",
+                    bounces,
+                    "--error",
+                    error,
+                ];
+                let probe = Probe {
+                    scene: &open,
+                    toml: lights,
+                    points: points.clone(),
+                    arguments: arguments
+                        .iter()
+                        .chain(&["--components", components])
+                        .map(|s| (*s).to_owned())
+                        .collect(),
+                };
+                probe.run(7)
+            };
+            let by_gather = probe("gather", "indirect", "1%");
+            let by_path = probe("path", "indirect", "1%");
+            for (a, b) in by_gather.iter().zip(&by_path) {
+                comparisons.push(Comparison {
+                    value: a.value.x,
+                    standard_error: a.standard_error.x.hypot(b.standard_error.x),
+                    expected: b.value.x,
+                });
+            }
+            let sum: Vec<f64> = by_path.iter().map(|e| e.value.x).collect();
+            if let Some(before) = &before {
+                let rises = sum.iter().zip(before).filter(|(a, b)| a > b).count();
+                assert_eq!(rises, sum.len(), "a second bounce adds light everywhere");
+            }
+            before = Some(sum);
+        }
+        z_test(&comparisons).unwrap_or_else(|error| panic!("{lights:?}: {error}"));
+    }
+}
+
+/// Paths and the gather bake the same light: means of groups of luxels differ by no more than their noise, and a bias below half
+/// a percent, which the size of patches leaves; and the errors that paths state are those that they have.
+#[test]
+fn paths_bake_what_the_gather_bakes() {
+    let mut scene = many_lights();
+    push_sky(&mut scene);
+    let places = Places::new(&scene, 32);
+    let receivers = &places.luxels.lit.receivers;
+    let by_gather = gathered(
+        &places.world,
+        &places.luxels,
+        Components::All,
+        Bounces::All,
+        0.005,
+        2,
+    );
+    let tracer = PathTracer::new(&places.world, 4);
+    let mut film = Film::new([receivers.len(), 1], MAX_REPLICATES as u32);
+    let paths = film.evenly(1024);
+    tracer.irradiance(&mut film, receivers, Components::All, &paths, &Silent);
+    let errors = film.errors(Alike::Values).expect("four replicates");
+    let level = film.values().map(|value| value.x).sum::<f64>() / receivers.len() as f64;
+    let by_path: Vec<Gathered> = film
+        .values()
+        .zip(&errors)
+        .zip(&by_gather)
+        .map(|((value, error), gathered)| {
+            let noise = gathered.standard_error().0;
+            let own = error.total();
+            Gathered {
+                direct: Irradiance(value),
+                direct_noise: Irradiance((own * own + noise * noise).map(f64::sqrt)),
+                ..Gathered::default()
+            }
+        })
+        .collect();
+    let expected: Vec<f64> = by_gather.iter().map(|g| g.irradiance().0.x).collect();
+    let ratio = agree(&by_path, &expected, 40, 0.005 * level).expect("the same light");
+    assert!((0.5..=1.5).contains(&ratio), "{ratio}");
+}
+
+/// `bake --integrator path` steers to the error that is asked for and says what it reached, the same at any number of threads.
+#[test]
+fn paths_bake_to_the_error_that_is_asked_for() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = example("cornell");
+    let bake = |threads: &str, extra: &[&str]| {
+        let out = folder.path().join(threads);
+        let options = [
+            "bake",
+            arg(&file),
+            "-o",
+            arg(&out),
+            "--size",
+            "32",
+            "-j",
+            threads,
+        ];
+        let more = ["--integrator", "path", "--error", "10%", "--json"];
+        let outcome = luxel(&[&options[..], &more[..], extra].concat());
+        outcome.assert_success();
+        (out, outcome.json())
+    };
+    let (one, json) = bake("1", &[]);
+    let (two, _) = bake("2", &[]);
+    let stated = json["stated"]["all"]["total"].as_f64().expect("a number");
+    assert!(stated <= 0.1 && stated > 0.02, "{stated}");
+    assert!(json["lightmap"]["energy"].is_null());
+    for name in [
+        "lightmap_000.exr",
+        "lightmap_000_error.exr",
+        "lightmap_000_luxels.exr",
+    ] {
+        let [one, two] = [&one, &two].map(|folder| std::fs::read(folder.join(name)));
+        assert!(one.expect("a file") == two.expect("a file"), "{name}");
+    }
+}
+
+#[test]
+fn what_makes_no_sense_together_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let cornell = example("cornell");
+    for (options, exit, words) in [
+        ("--include sky", ExitCode::NothingToDo, "no sky"),
+        ("--include masks", ExitCode::Usage, "direct,masks"),
+        (
+            "--include ao --bounces 2",
+            ExitCode::Usage,
+            "--include all or indirect",
+        ),
+        (
+            "--include indirect --bounces 0",
+            ExitCode::Usage,
+            "1 or more",
+        ),
+        ("--bounces -1", ExitCode::Usage, "--bounces"),
+        (
+            "--include ao --integrator path",
+            ExitCode::Usage,
+            "--include all, direct",
+        ),
+        (
+            "--include direct,masks --max-distance 1",
+            ExitCode::Usage,
+            "--include ao",
+        ),
+    ] {
+        let mut args = vec!["bake", arg(&cornell), "-o", arg(&out), "-q"];
+        args.extend(options.split(' '));
+        let outcome = luxel(&args);
+        assert_eq!(outcome.exit, exit, "{options}: {}", outcome.stderr);
+        assert!(
+            outcome.stderr.contains(words),
+            "{options}: {}",
+            outcome.stderr
+        );
+        assert!(!out.join("manifest.json").exists());
+    }
+    // A sky alone has no mask.
+    let mut open = scene("open", [Part::grey("floor", 0.5, vec![floor()])]);
+    open.name = "open".into();
+    let sky = "[[light]]\nkind = \"sky\"\nmodel = \"uniform\"\nradiance = 1\n";
+    let file = scene_files::write(&open, folder.path(), sky);
+    let args = [
+        "bake",
+        arg(&file),
+        "-o",
+        arg(&out),
+        "-q",
+        "--include",
+        "all,masks",
+    ];
+    let outcome = luxel(&args);
+    assert_eq!(outcome.exit, ExitCode::NothingToDo);
+    assert!(
+        outcome.stderr.contains("leave masks out"),
+        "{}",
+        outcome.stderr
+    );
+    for (verb, options, words) in [
+        (
+            "render",
+            "-o a.exr --integrator ao --bounces 1",
+            "gather, whitted or path",
+        ),
+        ("render", "-o a.exr --max-distance 1", "--integrator ao"),
+        (
+            "probe",
+            "--points p.csv --components direct --bounces 1",
+            "--components all or indirect",
+        ),
+        (
+            "probe",
+            "--points p.csv --components indirect --bounces 0",
+            "1 or more",
+        ),
+        ("probe", "--points p.csv --max-distance 1", "--quantity ao"),
+    ] {
+        let mut args = vec![verb, arg(&cornell)];
+        args.extend(options.split(' '));
+        let outcome = luxel(&args);
+        assert_eq!(
+            outcome.exit,
+            ExitCode::Usage,
+            "{options}: {}",
+            outcome.stderr
+        );
+        assert!(
+            outcome.stderr.contains(words),
+            "{options}: {}",
+            outcome.stderr
+        );
+    }
+}
