@@ -1,6 +1,6 @@
 //! `luxel bake`: lightmaps.
 
-mod deliver;
+pub(super) mod deliver;
 mod footprint;
 mod gathered;
 mod places;
@@ -16,6 +16,8 @@ use crate::files::OutputFolder;
 use crate::integrators::ao::Falloff;
 use crate::lightmap::atlas::Atlas;
 use crate::lightmap::bake::{self, Finished, Luxels, Smoothing};
+use crate::lightmap::encoding::Format;
+use crate::lightmap::handover::Handover;
 use crate::lightmap::manifest::{self, Manifest};
 use crate::lightmap::target::Target;
 use clap::ValueEnum;
@@ -28,8 +30,9 @@ use std::path::PathBuf;
 
 /// Bake the light of a scene into textures
 ///
-/// Writes a folder: the lightmaps as linear EXR, their standard error, the scene as glTF and OBJ with the lightmap's texture
-/// coordinates, manifest.json, which says what is where and in which unit, and pictures to look at.
+/// Writes a folder: the lightmaps, linear, in the kind of file that --format names; E as EXR with its standard error; the scene as
+/// glTF and OBJ with the lightmap's texture coordinates; manifest.json, which says what is where and in which unit; and pictures to look
+/// at. luxel export makes another folder of it for somebody else.
 #[derive(clap::Args)]
 pub(super) struct Bake {
     /// Scene file (.toml), or geometry (.obj, .gltf, .glb)
@@ -42,6 +45,10 @@ pub(super) struct Bake {
     /// Who is to show the maps: sets what a texel holds, and adds a file that shows how to load them
     #[arg(long = "for", value_enum, default_value = "raw", value_name = "WHOM")]
     target: Target,
+
+    /// Kind of file of the maps [default: what --for loads best: ktx2 for bevy, else exr]
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    format: Option<Format>,
 
     /// What the maps hold; for several, separated by commas, there is a set of maps each, the first called lightmap
     #[arg(
@@ -151,6 +158,7 @@ struct Layer {
 impl Bake {
     pub(super) fn run(self, session: &mut Session<'_>) -> Result<ExitCode, Failure> {
         self.check_options()?;
+        let handover = Handover::new(self.target, self.format)?;
         let folder = OutputFolder::prepare(&self.output)?;
         let loaded = scene::read_with_origin(&self.scene, &session.context)?;
         let scene = &loaded.scene;
@@ -170,7 +178,7 @@ impl Bake {
                 world: &world,
                 origin: loaded.origin.as_ref(),
                 baked: &baked,
-                target: self.target,
+                handover,
                 seed: context.common.seed,
             };
             let manifest = delivery.write()?;
@@ -233,6 +241,7 @@ impl Bake {
             manifest.atlas.texels_per_metre,
             memory::peak_in_words(),
         ));
+        deliver::tell_losses(manifest, &context.reporter);
         for object in &manifest.objects {
             context.reporter.detail(format_args!(
                 "{}: {:.3} m², {:.1} texels a metre",

@@ -10,6 +10,7 @@ mod converge;
 mod dense;
 mod diff;
 mod exit;
+mod export;
 mod footprint;
 mod form_factors;
 mod goal;
@@ -53,6 +54,7 @@ enum Verb {
     Solve(solve::Solve),
     Probe(probe::Probe),
     Bake(bake::Bake),
+    Export(export::Export),
     View(view::View),
     FormFactors(form_factors::FormFactors),
     Converge(converge::Converge),
@@ -126,6 +128,7 @@ pub fn run_with(
         Verb::Solve(verb) => verb.run(&mut session),
         Verb::Probe(verb) => verb.run(&mut session),
         Verb::Bake(verb) => verb.run(&mut session),
+        Verb::Export(verb) => verb.run(&mut session),
         Verb::View(verb) => verb.run(&mut session),
         Verb::FormFactors(verb) => verb.run(&mut session),
         Verb::Converge(verb) => verb.run(&mut session),

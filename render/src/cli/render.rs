@@ -16,7 +16,7 @@ use super::{Context, Session};
 use crate::camera::CameraFrame;
 use crate::files::Output;
 use crate::film::{Alike, Film, PixelError, SampleCounts};
-use crate::image::exr::{Origin, Picture};
+use crate::image::exr::{Origin, Picture, Rendered};
 use crate::image::{Image, exr, png};
 use crate::integrators::ao::{self, AmbientOcclusion, Falloff};
 use crate::integrators::gather::Gatherer;
@@ -158,7 +158,7 @@ impl Render {
         let picture = Picture {
             layers: layers(&film),
             image: film.mean(),
-            origin: Some(Origin {
+            origin: Some(Origin::Rendered(Rendered {
                 software: concat!("luxel ", env!("CARGO_PKG_VERSION")).into(),
                 scene: scene.name.clone(),
                 camera: camera.name.clone(),
@@ -169,7 +169,7 @@ impl Render {
                 },
                 samples,
                 seed: context.common.seed,
-            }),
+            })),
         };
         output.write(&exr::encode(&picture)?)?;
         if let Some(preview) = &preview {

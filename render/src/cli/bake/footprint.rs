@@ -1,5 +1,6 @@
 //! What a bake holds.
 
+use super::deliver::PAGES_AT_A_TIME;
 use super::{Bake, Include};
 use crate::cli::Context;
 use crate::cli::exit::Failure;
@@ -52,7 +53,7 @@ impl Bake {
             .with(
                 "maps",
                 2 * self.include.len() * Lightmap::bytes_for(texels)
-                    + 2 * Picture::bytes_for(page, 1),
+                    + PAGES_AT_A_TIME * Picture::bytes_for(page, 1),
             );
         let with_mesh = |error: f64| {
             let patches = self.first_patches(error);

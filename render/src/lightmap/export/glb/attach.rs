@@ -117,7 +117,8 @@ fn extras(baked: Baked, part: &Part) -> Option<Value> {
     }))
 }
 
-/// Adds to the extras of a node or primitive, or takes out what an earlier bake of the same file said.
+/// Adds to the extras of a node or primitive, or takes out what an earlier bake of the same file said. Extras that are no object, which
+/// the format allows and advises against, become the member `extras` of one.
 fn mark(item: &mut Value, lightmap: Option<&Value>) {
     let Some(lightmap) = lightmap else {
         if let Some(extras) = item.get_mut("extras").filter(|extras| extras.is_object()) {
@@ -126,5 +127,8 @@ fn mark(item: &mut Value, lightmap: Option<&Value>) {
         return;
     };
     let extras = child_mut(item, "extras");
+    if !extras.is_object() && !extras.is_null() {
+        *extras = json!({"extras": extras.take()});
+    }
     set(extras, "luxel_lightmap", lightmap.clone());
 }

@@ -124,6 +124,45 @@ fn strips_become_triangles_and_lines_stay() {
     assert!(primitive["attributes"].get("TEXCOORD_2").is_none());
 }
 
+/// The format advises that extras are objects, and allows everything: readers for numbers and lists are there, too.
+#[test]
+fn extras_of_all_kinds_are_kept() {
+    for extras in [
+        json!(5),
+        json!("text"),
+        json!([1, {"a": 2.5}]),
+        json!(true),
+        json!({"own": 1}),
+    ] {
+        let (mut document, bytes) = document();
+        document["meshes"][0]["primitives"]
+            .as_array_mut()
+            .expect("primitives")
+            .pop();
+        for place in ["/asset", "/nodes/0", "/meshes/0", "/meshes/0/primitives/0"] {
+            let item = document.pointer_mut(place).expect("it is there");
+            item["extras"] = extras.clone();
+        }
+        let (written, _, _) = written(&document, &bytes, &[Some(0), Some(0)]);
+        for place in [
+            "/asset/extras",
+            "/meshes/0/extras",
+            "/meshes/0/primitives/0/extras",
+        ] {
+            assert_eq!(written.pointer(place), Some(&extras), "{place}");
+        }
+        let marked = &written["nodes"][0]["extras"];
+        assert_eq!(marked["luxel_lightmap"]["page"], 0);
+        let kept = if extras.is_object() {
+            &marked["own"]
+        } else {
+            &marked["extras"]
+        };
+        let expected = extras.get("own").unwrap_or(&extras);
+        assert_eq!(kept, expected);
+    }
+}
+
 #[test]
 fn morph_targets_keep_a_node_whole() {
     let (mut document, bytes) = document();
