@@ -2,7 +2,8 @@
 //!
 //! Each block is one or two lines in colour space between end points that the block's mode quantises, and a place of three or four bits
 //! on them for each texel. Source: Khronos Group, "Khronos Data Format Specification", version 1.4, 2024, chapter "BC6H"; the
-//! choice of modes and end points is that of Intel's ISPC Texture Compressor, ported by the crate `block_compression`.
+//! choice of modes and end points is that of Intel's ISPC Texture Compressor, ported by the crate `block_compression`; blocks are
+//! decoded by another's code, `bcdec_rs`.
 //!
 //! Valid for values from 0 to 65504. There is no bound on the error of a texel: what a line cannot follow is lost, at the outlines of sharp
 //! coloured shadows above all. So every map is decoded again and the error that it has is told. Of a baked Cornell box of 256² texels
@@ -51,20 +52,19 @@ pub fn encode(pixels: impl Iterator<Item = [f64; 3]>, size: [usize; 2]) -> Vec<u
 /// The values that blocks stand for, row by row from the top.
 ///
 /// # Panics
-/// When there are not as many blocks as the `size` (width, height) says.
+/// When there are more blocks than the `size` (width, height) says.
 pub fn decode(blocks: &[u8], size: [usize; 2]) -> Vec<[f32; 3]> {
     let [width, height] = size;
-    let mut halves = vec![f16::ZERO; 4 * width * height];
-    let [across, down] = size.map(|side| side as u32);
-    block_compression::decode::decompress_blocks_as_rgba16f(
-        VARIANT,
-        across,
-        down,
-        blocks,
-        &mut halves,
-    );
-    let texels = halves.chunks_exact(4);
+    let mut texels = vec![[0.0; 3]; width * height];
+    let across = (width / SIDE).max(1);
+    for (index, block) in blocks.chunks_exact(BLOCK).enumerate() {
+        let mut found = [0.0_f32; 3 * SIDE * SIDE];
+        bcdec_rs::bc6h_float(block, &mut found, 3 * SIDE, false);
+        let first = index / across * SIDE * width + index % across * SIDE;
+        for (row, own) in found.chunks_exact(3 * SIDE).enumerate() {
+            let (own, _) = own.as_chunks::<3>();
+            texels[first + row * width..][..SIDE].copy_from_slice(own);
+        }
+    }
     texels
-        .map(|texel| [texel[0], texel[1], texel[2]].map(f16::to_f32))
-        .collect()
 }

@@ -6,8 +6,8 @@
 //! adds half a step when it reads, later readers (stb_image, the `image` crate, Bevy, Godot) add nothing: for them mantissas are
 //! rounded here, where truncation would take 0.3 % of the light. three.js (`HDRLoader` of r187) reads all values 256/255 times as large.
 //!
-//! Valid from 2⁻¹⁰⁰, below which pixels become black, to 255 · 2¹¹⁹. No channel changes by more than 2⁻⁸ of the largest of its
-//! pixel. Cost: linear, at most 4 bytes a pixel.
+//! Valid from 2⁻¹⁰⁰, below which pixels become black, to 255 · 2¹¹⁹. No channel changes by more than 2⁻⁸ of the largest of its pixel:
+//! half a step of at most 2⁻⁷ of it. Cost: linear, at most 4 bytes a pixel.
 
 use image::codecs::hdr::HdrEncoder;
 use image::{ImageError, Rgb};
@@ -31,9 +31,14 @@ pub fn rounded(pixel: [f64; 3]) -> [f64; 3] {
         return [0.0; 3];
     }
     // The exponent field of a normal number is exact where a logarithm may not be.
-    let exponent = ((largest.to_bits() >> 52) as i32 - 1022).min(127);
-    let step = 2.0_f64.powi(exponent - 8);
-    // 256 steps are the next exponent's 128.
+    let exponent = (largest.to_bits() >> 52) as i32 - 1022;
+    let fine = 2.0_f64.powi(exponent - 8);
+    // Where the largest is rounded up to 256 steps, it has the next exponent, and the others its steps.
+    let step = if largest / fine >= 255.5 {
+        2.0 * fine
+    } else {
+        fine
+    };
     pixel.map(|value| (value / step).round() * step)
 }
 

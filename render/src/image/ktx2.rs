@@ -43,7 +43,7 @@ impl Texels {
     fn vulkan(self) -> u32 {
         match self {
             Self::HalfFloat => 97,
-            Self::Bc6h => 131,
+            Self::Bc6h => 143,
         }
     }
 

@@ -1,7 +1,7 @@
 //! Gives a node the primitives that were made of its faces, so that what a node draws has one map.
 
 use super::Baked;
-use super::document::{Document, child_mut, object_mut, set};
+use super::document::{Document, extras_mut, object_mut, set};
 use crate::lightmap::export::pages::rectangle;
 use luxel_scenes::FaceId;
 use serde_json::{Value, json};
@@ -117,8 +117,7 @@ fn extras(baked: Baked, part: &Part) -> Option<Value> {
     }))
 }
 
-/// Adds to the extras of a node or primitive, or takes out what an earlier bake of the same file said. Extras that are no object, which
-/// the format allows and advises against, become the member `extras` of one.
+/// Adds to the extras of a node or primitive, or takes out what an earlier bake of the same file said.
 fn mark(item: &mut Value, lightmap: Option<&Value>) {
     let Some(lightmap) = lightmap else {
         if let Some(extras) = item.get_mut("extras").filter(|extras| extras.is_object()) {
@@ -126,9 +125,5 @@ fn mark(item: &mut Value, lightmap: Option<&Value>) {
         }
         return;
     };
-    let extras = child_mut(item, "extras");
-    if !extras.is_object() && !extras.is_null() {
-        *extras = json!({"extras": extras.take()});
-    }
-    set(extras, "luxel_lightmap", lightmap.clone());
+    set(extras_mut(item), "luxel_lightmap", lightmap.clone());
 }
