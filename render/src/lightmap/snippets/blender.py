@@ -54,7 +54,7 @@ for thing in bpy.data.objects:
         lit.inputs["Factor"].default_value = 1.0
         emission = nodes.new("ShaderNodeEmission")
         link(uv.outputs["UV"], texture.inputs["Vector"])
-        link(texture.outputs["Color"], lit.inputs["A"])
+        link(light, lit.inputs["A"])
         if base.links:
             link(base.links[0].from_socket, lit.inputs["B"])
         else:
