@@ -106,6 +106,8 @@ impl Output {
         let _held = hold_writes();
         let mut temporary = self.temporary()?;
         content(temporary.as_file_mut()).map_err(refused)?;
+        // Some file systems find out only now that there is no room.
+        temporary.as_file().sync_data().map_err(refused)?;
         temporary
             .persist(&self.target)
             .map_err(|error| refused(error.error))?;

@@ -1,7 +1,12 @@
 //! Images and their files.
 
+#[cfg(feature = "bc6h")]
+pub mod bc6h;
 pub mod exr;
+pub mod hdr;
+pub mod ktx2;
 pub mod png;
+pub mod rgbm;
 
 /// A linear RGB image, row-major, row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]

@@ -27,6 +27,7 @@ pub mod ply;
 pub mod points;
 pub mod progress;
 pub mod report;
+pub mod serve;
 pub mod solution;
 pub mod tone_map;
 pub mod view;

@@ -4,16 +4,20 @@
 //! them ([`luxels`]), the points become receivers ([`receivers`]), faces under thin walls are cut ([`walls`], [`mod@cut`]), light is gathered ([`bake`]), and what lies
 //! between and beside the charts is filled ([`dilation`]) and fitted ([`fit`], [`seams`]) so that filtered look-ups are right.
 //! [`lookup`] is how an engine reads the result, [`view`] how it shows it, and [`mod@target`] what it wants texels to hold;
-//! [`export`] writes the scene with its new coordinates, [`manifest`] what is where, [`mod@page`] all of it as a page to look at.
+//! [`encoding`] makes files of maps, [`handover`] all that is made for one consumer. [`export`] writes the scene with its new
+//! coordinates, [`manifest`] what is where, [`folder`] reads it again, and [`mod@page`] makes all of it a page to look at.
 
 pub mod atlas;
 pub mod bake;
 pub mod cut;
 pub mod denoise;
 pub mod dilation;
+pub mod encoding;
 pub mod export;
 pub mod fit;
+pub mod folder;
 pub mod given;
+pub mod handover;
 pub mod lookup;
 pub mod luxels;
 pub mod manifest;

@@ -4,6 +4,7 @@ mod agreement;
 mod ambient_occlusion;
 mod bad_input;
 mod cie171;
+mod delivery;
 mod determinism;
 mod enclosures;
 mod extremes;

@@ -1,6 +1,6 @@
 //! `luxel bake`: lightmaps.
 
-mod deliver;
+pub(super) mod deliver;
 mod footprint;
 mod gathered;
 mod include;
@@ -25,6 +25,8 @@ use crate::files::OutputFolder;
 use crate::lightmap::atlas::Atlas;
 use crate::lightmap::bake::{self, Finished, Luxels, Smoothing};
 use crate::lightmap::cut::{self, CutScene};
+use crate::lightmap::encoding::Format;
+use crate::lightmap::handover::Handover;
 use crate::lightmap::manifest::{self, Manifest};
 use crate::lightmap::target::Target;
 use crate::lightmap::walls;
@@ -43,8 +45,9 @@ use std::time::Duration;
 
 /// Bake the light of a scene into textures
 ///
-/// Writes a folder: the lightmaps as linear EXR, their standard error, the scene as glTF and OBJ with the lightmap's texture
-/// coordinates, manifest.json, which says what is where and in which unit, and pictures to look at.
+/// Writes a folder: the lightmaps, linear, in the kind of file that --format names; E as EXR with its standard error; the scene as
+/// glTF and OBJ with the lightmap's texture coordinates; manifest.json, which says what is where and in which unit; and pictures to look
+/// at. luxel export makes another folder of it for somebody else.
 #[derive(clap::Args, Serialize)]
 pub(super) struct Bake {
     /// Scene file (.toml), or geometry (.obj, .gltf, .glb)
@@ -70,6 +73,10 @@ pub(super) struct Bake {
     #[arg(long = "for", value_enum, default_value = "raw", value_name = "WHOM")]
     #[serde(rename = "for")]
     target: Target,
+
+    /// Kind of file of the maps [default: what --for loads best: ktx2 for bevy, else exr]
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    format: Option<Format>,
 
     /// What the maps hold; for several, separated by commas, there is a set of maps each, the first called lightmap
     #[arg(
@@ -192,6 +199,7 @@ impl Baked {
 impl Bake {
     pub(super) fn run(self, session: &mut Session<'_>) -> Result<ExitCode, Failure> {
         self.check_options()?;
+        let handover = Handover::new(self.target, self.format)?;
         let folder = OutputFolder::prepare(&self.output)?;
         let loaded = scene::read_with_origin(&self.scene, &session.context)?;
         let scene = &loaded.scene;
@@ -234,7 +242,7 @@ impl Bake {
                 origin: loaded.origin.as_ref(),
                 corners,
                 baked: &baked,
-                target: self.target,
+                handover,
                 bounces: self.reflections.bounces(),
                 seed: context.common.seed,
             };
@@ -288,6 +296,7 @@ impl Bake {
             manifest.atlas.texels_per_metre,
             memory::peak_in_words(),
         ));
+        deliver::tell_losses(manifest, &context.reporter);
         for object in &manifest.objects {
             context.reporter.detail(format_args!(
                 "{}: {:.3} m², {:.1} texels a metre",

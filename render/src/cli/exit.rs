@@ -1,6 +1,6 @@
 //! How the command ends.
 
-use crate::lightmap::page::ContentError;
+use crate::lightmap::folder::FolderError;
 use crate::points::PointsError;
 use std::error::Error;
 
@@ -79,10 +79,10 @@ impl From<PointsError> for Failure {
     }
 }
 
-impl From<ContentError> for Failure {
-    fn from(error: ContentError) -> Self {
+impl From<FolderError> for Failure {
+    fn from(error: FolderError) -> Self {
         let exit = match error {
-            ContentError::Unreadable(..) => ExitCode::Failure,
+            FolderError::Unreadable(..) => ExitCode::Failure,
             _ => ExitCode::InvalidInput,
         };
         Self::new(exit, error)
@@ -111,10 +111,13 @@ exits_with! {
     luxel_solver::pilot::PilotError => InvalidInput,
     luxel_solver::solvers::DirectError => Failure,
     luxel_solver::solvers::NotReciprocal => InvalidInput,
+    crate::lightmap::encoding::EncodeMapError => Failure,
     crate::lightmap::export::glb::GlbError => Failure,
     crate::lightmap::given::GivenError => InvalidInput,
+    crate::lightmap::handover::HandoverError => Usage,
     crate::lightmap::unwrap::UnwrapError => InvalidInput,
     crate::ply::TooManyCorners => Failure,
+    crate::serve::ServeError => Failure,
     csv::Error => Failure,
     std::io::Error => Failure,
     luxel_solver::transport::DenseError => Failure,

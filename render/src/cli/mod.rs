@@ -11,6 +11,7 @@ mod converge;
 mod dense;
 mod diff;
 mod exit;
+mod export;
 mod footprint;
 mod form_factors;
 mod goal;
@@ -56,6 +57,7 @@ enum Verb {
     Solve(solve::Solve),
     Probe(probe::Probe),
     Bake(bake::Bake),
+    Export(export::Export),
     View(view::View),
     FormFactors(form_factors::FormFactors),
     Converge(converge::Converge),
@@ -129,6 +131,7 @@ pub fn run_with(
         Verb::Solve(verb) => verb.run(&mut session),
         Verb::Probe(verb) => verb.run(&mut session),
         Verb::Bake(verb) => verb.run(&mut session),
+        Verb::Export(verb) => verb.run(&mut session),
         Verb::View(verb) => verb.run(&mut session),
         Verb::FormFactors(verb) => verb.run(&mut session),
         Verb::Converge(verb) => verb.run(&mut session),

@@ -18,7 +18,7 @@ use super::{Context, Session};
 use crate::camera::CameraFrame;
 use crate::files::Output;
 use crate::film::{Alike, Film, PixelError, SampleCounts};
-use crate::image::exr::{Origin, Picture};
+use crate::image::exr::{Origin, Picture, Rendered};
 use crate::image::{Image, exr, png};
 use crate::integrators::ao::AmbientOcclusion;
 use crate::integrators::gather::Gatherer;
@@ -155,7 +155,7 @@ impl Render {
         let picture = Picture {
             layers: layers(&film),
             image: film.mean(),
-            origin: Some(Origin {
+            origin: Some(Origin::Rendered(Rendered {
                 software: concat!("luxel ", env!("CARGO_PKG_VERSION")).into(),
                 scene: scene.name.clone(),
                 camera: camera.name.clone(),
@@ -166,7 +166,7 @@ impl Render {
                 },
                 samples,
                 seed: context.common.seed,
-            }),
+            })),
         };
         output.write(&exr::encode(&picture)?)?;
         if let Some(preview) = &preview {

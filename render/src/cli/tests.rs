@@ -1,7 +1,7 @@
 //! The command from its arguments to its exit code, stdout, stderr and files.
 
 use super::*;
-use crate::image::exr::read;
+use crate::image::exr::{Origin, read};
 use std::fs;
 use std::path::PathBuf;
 
@@ -87,6 +87,9 @@ fn help_and_version_are_results() {
         "render",
         "solve",
         "probe",
+        "bake",
+        "export",
+        "view",
         "form-factors",
         "converge",
         "check",
@@ -233,7 +236,9 @@ fn every_integrator_writes_a_picture_of_the_furnace() {
         assert_eq!(stdout, format!("{exr}\n{png}\n"));
         let picture = read(std::path::Path::new(&exr)).expect("an EXR file");
         assert_eq!((picture.image.width, picture.image.height), (8, 6));
-        let origin = picture.origin.expect("luxel says where a picture is from");
+        let Some(Origin::Rendered(origin)) = picture.origin else {
+            panic!("luxel says where a picture is from");
+        };
         assert_eq!(
             (
                 origin.integrator.as_str(),

@@ -17,7 +17,17 @@ use std::path::{Path, PathBuf};
 
 /// Where a picture came from.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Origin {
+#[serde(untagged)]
+pub enum Origin {
+    /// A camera looked at a scene.
+    Rendered(Rendered),
+    /// A page of a lightmap.
+    Baked(Baked),
+}
+
+/// How a picture was rendered.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Rendered {
     /// The program and its version.
     pub software: String,
     /// Name of the scene.
@@ -32,6 +42,61 @@ pub struct Origin {
     pub samples: SampleCounts,
     /// Seed of all randomness.
     pub seed: u64,
+}
+
+/// What a page of a lightmap holds.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Baked {
+    /// The program and its version.
+    pub software: String,
+    /// Name of the scene.
+    pub scene: String,
+    /// Which light: `all`, `direct` or `indirect`, or `ao`.
+    pub include: String,
+    /// What the values are, such as `irradiance`.
+    pub quantity: String,
+    /// Unit of the values, such as `W/m2`.
+    pub unit: String,
+    /// Error of the light at luxels relative to their mean over all pages, one standard deviation.
+    pub error: f64,
+    /// The page, from zero.
+    pub page: usize,
+    /// Seed of all randomness.
+    pub seed: u64,
+}
+
+impl Origin {
+    fn software(&self) -> &str {
+        match self {
+            Self::Rendered(origin) => &origin.software,
+            Self::Baked(origin) => &origin.software,
+        }
+    }
+
+    /// A line for those who look at the file's attributes.
+    fn comment(&self) -> String {
+        match self {
+            Self::Rendered(origin) => format!(
+                "linear RGB (Rec. 709 primaries), {}; scene {}, camera {}, integrator {}, {:.1} samples a pixel, seed {}",
+                origin.unit,
+                origin.scene,
+                origin.camera,
+                origin.integrator,
+                origin.samples.mean,
+                origin.seed
+            ),
+            Self::Baked(origin) => format!(
+                "linear RGB (Rec. 709 primaries), {} in {}; scene {}, lightmap of {}, page {}, relative error {:.2e}, seed {}",
+                origin.quantity,
+                origin.unit,
+                origin.scene,
+                origin.include,
+                origin.page,
+                origin.error,
+                origin.seed
+            ),
+        }
+    }
 }
 
 /// An EXR file's content.
@@ -100,16 +165,8 @@ pub fn encode(picture: &Picture) -> Result<Vec<u8>, EncodeExrError> {
     }
     let mut attributes = LayerAttributes::default();
     if let Some(origin) = &picture.origin {
-        attributes.software_name = Some(text(&origin.software));
-        attributes.comments = Some(text(&format!(
-            "linear RGB (Rec. 709 primaries), {}; scene {}, camera {}, integrator {}, {:.1} samples a pixel, seed {}",
-            origin.unit,
-            origin.scene,
-            origin.camera,
-            origin.integrator,
-            origin.samples.mean,
-            origin.seed
-        )));
+        attributes.software_name = Some(text(origin.software()));
+        attributes.comments = Some(text(&origin.comment()));
         let json = AttributeValue::Text(text(&serde_json::to_string(origin)?));
         attributes.other.insert(text(ATTRIBUTE), json);
     }
@@ -264,7 +321,7 @@ mod tests {
         Picture {
             image: image(1.0),
             layers: vec![("standard_error".into(), image(0.1))],
-            origin: Some(Origin {
+            origin: Some(Origin::Rendered(Rendered {
                 software: "luxel 0".into(),
                 scene: "Küche 台所".into(),
                 camera: "main".into(),
@@ -276,7 +333,7 @@ mod tests {
                     max: 32,
                 },
                 seed: u64::MAX,
-            }),
+            })),
         }
     }
 
@@ -288,11 +345,39 @@ mod tests {
         std::fs::write(&path, encode(&written).expect("encodable")).expect("writable");
         let read = read(&path).expect("readable");
         // Characters outside the format's alphabet are replaced, everything else is kept.
-        if let (Some(written), Some(read)) = (&mut written.origin, &read.origin) {
+        if let (Some(Origin::Rendered(written)), Some(Origin::Rendered(read))) =
+            (&mut written.origin, &read.origin)
+        {
             written.scene.clone_from(&read.scene);
             assert!(read.scene.contains("che"));
         }
         assert_eq!(read, written);
+    }
+
+    #[test]
+    fn a_page_says_what_it_holds() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("image.exr");
+        let page = Baked {
+            software: "luxel 0".into(),
+            scene: "room".into(),
+            include: "all".into(),
+            quantity: "irradiance".into(),
+            unit: "lx".into(),
+            error: 0.1 + 0.2,
+            page: 3,
+            seed: 0,
+        };
+        let written = Picture {
+            origin: Some(Origin::Baked(page)),
+            ..picture()
+        };
+        let bytes = encode(&written).expect("encodable");
+        let comment =
+            b"irradiance in lx; scene room, lightmap of all, page 3, relative error 3.00e-1";
+        assert!(bytes.windows(comment.len()).any(|own| own == comment));
+        std::fs::write(&path, bytes).expect("writable");
+        assert_eq!(read(&path).expect("readable").origin, written.origin);
     }
 
     #[test]

@@ -1,16 +1,20 @@
 //! `manifest.json`: what a folder of lightmaps holds, for programs that load it.
 //!
-//! Schema 1. Texture coordinates have v downwards from the first row of the image, as in glTF; `rectangles` are texels. It says
+//! Schema 2. Texture coordinates have v downwards from the first row of the image, as in glTF; `rectangles` are texels. It says
 //! nothing of time, machine or threads: the same scene and options give the same bytes.
+//!
+//! Every page has a master, E (or openness) as it was found; what the engine loads is made of that ([`super::encoding`]), and
+//! `luxel export` makes it again for others.
 
 use super::atlas::{Atlas, Rectangle};
+use super::encoding::Format;
 use super::target::{Quantity, Target};
 use luxel_scenes::{Scene, UnitSystem};
 use luxel_solver::solvers::Ledger;
 use serde::{Deserialize, Serialize};
 
 /// Version of the schema that is written and read.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 
 /// The folder's content.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -116,7 +120,12 @@ pub struct Units {
 pub struct Page {
     /// What the engine loads.
     pub file: String,
-    /// Standard error of its texels, in their unit.
+    /// How texels are got from it.
+    pub encoding: Encoding,
+    /// What it was made of: E in 32-bit floats, filled and filtered; openness of ambient occlusion. The same file where that is what
+    /// the engine loads.
+    pub master: String,
+    /// Standard error of the master's texels, in their unit.
     pub error: String,
     /// What was gathered (E), before anything was filled or filtered, black where nothing was, with its standard error in
     /// the layer `error`.
@@ -129,6 +138,23 @@ pub struct Page {
     pub width: usize,
     /// Height in texels.
     pub height: usize,
+}
+
+/// How texels are got from a file, and light from texels.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Encoding {
+    /// Kind of file.
+    pub format: Format,
+    /// What a texel is, with `rgb` and `a` as the file's kind defines them, from 0 to 1 in a PNG file: all linear.
+    pub formula: String,
+    /// `scale` of the formula.
+    pub scale: f64,
+    /// Factor from the master to the texel: E is texel / factor.
+    pub factor: f64,
+    /// What the encoding alone changed: root mean square of the differences over the mean of the page.
+    pub loss: f64,
+    /// Values beyond what the format holds, which were moved to its end.
+    pub clamped: usize,
 }
 
 /// How the scene is sampled.

@@ -9,7 +9,7 @@ mod content;
 mod encode;
 mod summary;
 
-pub use content::{Content, ContentError, Maps};
+pub use content::{Content, Maps};
 
 use super::manifest::{Manifest, Page};
 use crate::report::html::{base64, escape};

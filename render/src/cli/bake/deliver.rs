@@ -3,6 +3,7 @@
 use super::{Baked, Layer, mask_files, texels_per_metre};
 use crate::camera::CameraFrame;
 use crate::cli::exit::Failure;
+use crate::cli::reporter::Reporter;
 use crate::files::OutputFolder;
 use crate::image::exr::{self, Picture};
 use crate::image::{Image, png};
@@ -11,15 +12,15 @@ use crate::lightmap::bake::Finished;
 use crate::lightmap::cut::Weights;
 use crate::lightmap::export::glb::glb;
 use crate::lightmap::export::obj::obj;
-use crate::lightmap::manifest::{self, Bevy, Files, Manifest, Page, Sampling, Units};
+use crate::lightmap::handover::{self, Common, Handover, Of, Values};
+use crate::lightmap::manifest::{self, Files, Manifest, Page, Sampling};
 use crate::lightmap::map::Texel;
 use crate::lightmap::picture;
-use crate::lightmap::target::Target;
 use crate::lightmap::view::LightmapView;
 use crate::progress::Silent;
 use crate::tone_map::ToneMap;
 use glam::DVec3;
-use luxel_scenes::{Camera, FieldOfView, GltfOrigin, Projection, Rgb, Scene, UnitSystem};
+use luxel_scenes::{Camera, FieldOfView, GltfOrigin, Projection, Scene};
 use luxel_solver::bounces::Bounces;
 use luxel_solver::world::World;
 use rayon::prelude::*;
@@ -29,6 +30,9 @@ const PREVIEW_SAMPLES: u32 = 16;
 const PREVIEW_SIDE: usize = 768;
 const PREVIEW_SIZE: [usize; 2] = [768, 576];
 
+/// The program and its version.
+const SOFTWARE: &str = concat!("luxel ", env!("CARGO_PKG_VERSION"));
+
 /// What is delivered, to whom.
 pub(super) struct Delivery<'a> {
     pub(super) folder: &'a OutputFolder,
@@ -37,7 +41,7 @@ pub(super) struct Delivery<'a> {
     /// What the corners of the scene are made of, where its faces were cut.
     pub(super) corners: Option<&'a [Weights]>,
     pub(super) baked: &'a Baked,
-    pub(super) target: Target,
+    pub(super) handover: Handover,
     pub(super) bounces: Bounces,
     pub(super) seed: u64,
 }
@@ -52,16 +56,16 @@ impl Delivery<'_> {
         let mut described = Vec::new();
         for (index, layer) in layers.iter().enumerate() {
             let include = crate::cli::name(&layer.include);
-            let stem = if index == 0 {
-                "lightmap"
-            } else {
-                include.as_str()
+            let of = Of {
+                common: self.common(),
+                include: &include,
+                is_first: index == 0,
+                error: layer.error.luxels,
             };
-            let pages: Vec<Page> = (0..atlas.pages).map(|page| self.page(stem, page)).collect();
-            self.write_maps(layer, &pages)?;
+            let pages = each_page(atlas.pages, |page| self.write_page(layer, &of, page))?;
             described.push(manifest::Layer {
-                include,
                 pages,
+                include,
                 error: layer.error,
                 energy: layer.energy,
                 patches: layer.patches,
@@ -95,63 +99,41 @@ impl Delivery<'_> {
             .write("preview.png", &png::encode(&preview, tone_map)?)?;
         let exposure = f64::from(tone_map.exposure);
         let manifest = self.manifest(lightmap, described.collect(), masks, exposure);
-        if let Some((name, text)) = self.target.snippet() {
-            let exposure = manifest.bevy.map_or(1.0, |bevy| bevy.lightmap_exposure);
-            let text = text.replace("{lightmap_exposure}", &format!("{exposure:?}"));
-            self.folder.write(name, text.as_bytes())?;
-        }
-        let mut text = serde_json::to_string_pretty(&manifest)?;
-        text.push('\n');
-        self.folder.write("manifest.json", text.as_bytes())?;
+        write_manifest(self.folder, self.handover, &manifest)?;
         Ok(manifest)
     }
 
-    fn page(&self, stem: &str, page: usize) -> Page {
-        Page {
-            file: format!("{stem}_{page:03}.exr"),
-            error: format!("{stem}_{page:03}_error.exr"),
-            luxels: format!("{stem}_{page:03}_luxels.exr"),
-            validity: format!("atlas_{page:03}_validity.png"),
-            charts: format!("atlas_{page:03}.png"),
-            width: self.baked.atlas.size[0],
-            height: self.baked.atlas.size[1],
+    fn common(&self) -> Common<'_> {
+        let scene = self.world.scene();
+        Common {
+            software: SOFTWARE,
+            scene: &scene.name,
+            units: scene.units,
+            seed: self.seed,
         }
     }
 
-    /// Writes the files of a set of maps.
-    fn write_maps(&self, layer: &Layer, pages: &[Page]) -> Result<(), Failure> {
+    /// Writes the maps of a page.
+    fn write_page(&self, layer: &Layer, of: &Of, page: usize) -> Result<Page, Failure> {
         let Finished { raw, map } = &layer.maps;
-        let factor = if layer.include.is_light() {
-            self.target.quantity().factor()
-        } else {
-            1.0
+        let picture = |image, layers, values| Picture {
+            image,
+            layers,
+            origin: Some(of.origin(values, page)),
         };
-        let scaled =
-            |values: &[Rgb]| -> Vec<Rgb> { values.iter().map(|value| *value * factor).collect() };
-        let (values, errors) = (scaled(&map.values), scaled(&map.errors));
-        let pictures: Vec<(&str, Picture)> = pages
-            .iter()
-            .enumerate()
-            .flat_map(|(index, page)| {
-                let luxels = raw.page(index, &raw.values);
-                let error = ("error".to_owned(), raw.page(index, &raw.errors));
-                [
-                    (
-                        page.file.as_str(),
-                        picture_of(map.page(index, &values), vec![]),
-                    ),
-                    (
-                        page.error.as_str(),
-                        picture_of(map.page(index, &errors), vec![]),
-                    ),
-                    (page.luxels.as_str(), picture_of(luxels, vec![error])),
-                ]
-            })
-            .collect();
-        pictures.par_iter().try_for_each(|(name, picture)| {
-            self.folder.write(name, &exr::encode(picture)?)?;
-            Ok(())
-        })
+        let stem = of.stem(page);
+        let master = map.page(page, &map.values);
+        let files = self.handover.files(&master, of, page)?;
+        drop(master);
+        let described = write_page(self.folder, &files, &stem, map.size)?;
+        let error = picture(map.page(page, &map.errors), vec![], Values::Error);
+        self.folder.write(&described.error, &exr::encode(&error)?)?;
+        let luxels = raw.page(page, &raw.values);
+        let error = ("error".to_owned(), raw.page(page, &raw.errors));
+        let luxels = picture(luxels, vec![error], Values::Luxels);
+        self.folder
+            .write(&described.luxels, &exr::encode(&luxels)?)?;
+        Ok(described)
     }
 
     /// The scene with its maps, from its first camera or one that sees most of it.
@@ -184,21 +166,11 @@ impl Delivery<'_> {
         let Baked { atlas, .. } = self.baked;
         let map = &self.baked.layers[0].maps.map;
         let scene = self.world.scene();
-        let quantity = self.target.quantity();
         Manifest {
             schema: manifest::SCHEMA,
-            software: concat!("luxel ", env!("CARGO_PKG_VERSION")).into(),
+            software: SOFTWARE.into(),
             scene: scene.name.clone(),
-            units: Units {
-                quantity,
-                unit: match scene.units {
-                    UnitSystem::Radiometric => "W/m2".into(),
-                    UnitSystem::Photometric => "lx".into(),
-                },
-                factor: quantity.factor(),
-                colour_space: "linear Rec. 709".into(),
-                target: self.target,
-            },
+            units: self.handover.units(scene.units),
             exposure,
             lightmap,
             others,
@@ -227,18 +199,75 @@ impl Delivery<'_> {
                 obj: "scene.obj".into(),
                 preview: "preview.png".into(),
             },
-            bevy: (self.target == Target::Bevy).then(|| Bevy::new(scene.units, exposure)),
+            bevy: self.handover.bevy(scene.units, exposure),
             seed: self.seed,
         }
     }
 }
 
-/// A picture that needs no word on its origin: the manifest has it.
-fn picture_of(image: Image, layers: Vec<(String, Image)>) -> Picture {
-    Picture {
-        image,
-        layers,
-        origin: None,
+/// Pages that are encoded at a time, whatever the number of threads: what a command holds does not depend on that.
+pub(in crate::cli) const PAGES_AT_A_TIME: usize = 2;
+
+/// Does something for each page, and returns what it gives in their order.
+pub(in crate::cli) fn each_page<T: Send>(
+    pages: usize,
+    work: impl Fn(usize) -> Result<T, Failure> + Sync,
+) -> Result<Vec<T>, Failure> {
+    let mut all = Vec::with_capacity(pages);
+    for first in (0..pages).step_by(PAGES_AT_A_TIME) {
+        let some = first..(first + PAGES_AT_A_TIME).min(pages);
+        let done: Result<Vec<T>, Failure> = some.into_par_iter().map(&work).collect();
+        all.extend(done?);
+    }
+    Ok(all)
+}
+
+/// Writes what a consumer gets of a page with its master, and says what belongs to the page. The other files that it names are still to
+/// be written.
+pub(in crate::cli) fn write_page(
+    folder: &OutputFolder,
+    files: &handover::Files,
+    stem: &str,
+    size: [usize; 2],
+) -> Result<Page, Failure> {
+    for (name, bytes) in std::iter::once(&files.file).chain(&files.master) {
+        folder.write(name, bytes)?;
+    }
+    let (_, number) = stem.rsplit_once('_').unwrap_or_default();
+    Ok(Page {
+        file: files.file.0.clone(),
+        encoding: files.encoding.clone(),
+        master: files.master_name().to_owned(),
+        error: format!("{stem}_error.exr"),
+        luxels: format!("{stem}_luxels.exr"),
+        validity: format!("atlas_{number}_validity.png"),
+        charts: format!("atlas_{number}.png"),
+        width: size[0],
+        height: size[1],
+    })
+}
+
+/// Writes what ends a folder: the snippet, and the manifest last.
+pub(in crate::cli) fn write_manifest(
+    folder: &OutputFolder,
+    handover: Handover,
+    manifest: &Manifest,
+) -> Result<(), Failure> {
+    if let Some((name, text)) = handover.snippet(manifest) {
+        folder.write(name, text.as_bytes())?;
+    }
+    let mut text = serde_json::to_string_pretty(manifest)?;
+    text.push('\n');
+    Ok(folder.write("manifest.json", text.as_bytes())?)
+}
+
+/// Tells what the maps' files do not hold.
+pub(in crate::cli) fn tell_losses(manifest: &Manifest, reporter: &Reporter) {
+    for warning in handover::warnings(manifest) {
+        reporter.warning(warning);
+    }
+    if let Some(loss) = handover::loss(manifest) {
+        reporter.note(loss);
     }
 }
 

@@ -1,5 +1,6 @@
 //! What a bake holds.
 
+use super::deliver::PAGES_AT_A_TIME;
 use super::{Bake, Include};
 use crate::cli::Context;
 use crate::cli::exit::Failure;
@@ -103,7 +104,8 @@ impl Bake {
             .with("what is gathered at them", gathered.max(sampled))
             .with(
                 "maps",
-                2 * layers * Lightmap::bytes_for(texels) + 2 * Picture::bytes_for(page, 1),
+                2 * layers * Lightmap::bytes_for(texels)
+                    + PAGES_AT_A_TIME * Picture::bytes_for(page, 1),
             )
             .with("masks", bytes_of_masks(texels, masks))
     }

@@ -31,9 +31,4 @@ impl Include {
             Self::Sky | Self::Ao | Self::Masks => None,
         }
     }
-
-    /// Whether its texels hold light, in the unit that the consumer wants.
-    pub(super) fn is_light(self) -> bool {
-        self == Self::Sky || self.components().is_some()
-    }
 }

@@ -18,7 +18,8 @@
 //! "luxel_lightmap": {"page": 0, "file": "lightmap_000.exr", "texCoord": 1, "rect": {"min": [0, 0], "max": [0.5, 0.25]}}
 //! ```
 //!
-//! `rect` bounds the texels of its faces, in texture coordinates. A node whose faces are on several pages becomes a parent of
+//! Extras that the node had stay beside it; one that was no object stands in the object's member `extras`. `rect` bounds the texels
+//! of its faces, in texture coordinates. A node whose faces are on several pages becomes a parent of
 //! one child a page, and one for what has no lightmap. Where that cannot be, because morph targets or GPU instances belong to
 //! the node, the primitives of its mesh carry the extras instead. three.js (`GLTFLoader` of r187) gives extras of nodes to
 //! `Object3D.userData`, those of a mesh to every `Mesh` of it, and those of a primitive to `geometry.userData`; Bevy has them as
@@ -32,10 +33,13 @@ mod document;
 mod embed;
 mod made;
 mod original;
+mod renamed;
 mod surfaces;
 mod texture_sets;
 mod vertices;
 mod views;
+
+pub use renamed::renamed;
 
 use super::pages::Pages;
 use crate::lightmap::atlas::Atlas;
@@ -89,6 +93,9 @@ pub enum GlbError {
         /// File names.
         maps: usize,
     },
+    /// Bytes that are not those of a bake.
+    #[error("not the scene of a bake: {0}; bake again: luxel bake SCENE -o DIR")]
+    NotOurs(&'static str),
     /// The container counts its bytes in 32 bits.
     #[error(
         "the scene takes {0} bytes, and a GLB file holds less than 4 GiB; bake it in parts or write OBJ"

@@ -1,7 +1,7 @@
 //! What a bake says of itself, as folded tables beside the picture.
 
-use crate::lightmap::manifest::{Manifest, Placed};
-use crate::lightmap::target::{Quantity, Target};
+use crate::lightmap::manifest::{Layer, Manifest, Placed};
+use crate::lightmap::target::Quantity;
 use crate::report::html::{concat, escape};
 use clap::ValueEnum;
 
@@ -103,12 +103,25 @@ fn units(manifest: &Manifest) -> String {
         ("included", escape(light(&manifest.lightmap.include))),
         ("a texel holds", texel),
         ("colours", escape(&units.colour_space)),
+        ("files", files(&manifest.lightmap)),
         ("made for", name(units.target)),
         ("exposure", figure(manifest.exposure)),
         ("patches", manifest.lightmap.patches.to_string()),
         ("seed", manifest.seed.to_string()),
         ("program", escape(&manifest.software)),
     ])
+}
+
+/// The kind of the maps' files, and the most that it loses of a page.
+fn files(lightmap: &Layer) -> String {
+    let encodings = lightmap.pages.iter().map(|page| &page.encoding);
+    let loss = encodings.clone().map(|own| own.loss).fold(0.0, f64::max);
+    let format = encodings.map(|own| name(own.format)).next();
+    format!(
+        "{}, which changes {}",
+        format.unwrap_or_default(),
+        percent(loss)
+    )
 }
 
 fn energy(manifest: &Manifest) -> String {
@@ -167,9 +180,9 @@ fn light(include: &str) -> &str {
     }
 }
 
-/// A consumer as `--for` calls it.
-fn name(target: Target) -> String {
-    target
+/// A value as the command line calls it.
+fn name(value: impl ValueEnum) -> String {
+    value
         .to_possible_value()
         .map(|value| value.get_name().to_owned())
         .unwrap_or_default()

@@ -214,7 +214,7 @@ function sharedUniforms() {
 }
 
 /** Gives a mesh of the scene a material of the page's own, made of what the file says of it. */
-function dress(mesh, page, factor, shared) {
+function dress(mesh, page, shared) {
   const was = mesh.material;
   const { attributes } = mesh.geometry;
   const setOf = (texture) => attributes[texture.channel === 0 ? 'uv' : `uv${texture.channel}`];
@@ -222,8 +222,8 @@ function dress(mesh, page, factor, shared) {
     ...shared,
     hasLight: { value: Boolean(page && attributes.uv1) },
     hasNormals: { value: Boolean(attributes.normal) },
-    // Texels hold E times a factor; a white surface sends out E / π.
-    toRadiance: { value: page ? page.scale / (Math.PI * factor) : 0 },
+    // A white surface sends out E / π.
+    toRadiance: { value: page ? page.scale / Math.PI : 0 },
     size: { value: new THREE.Vector2(page?.width ?? 1, page?.height ?? 1) },
     light: { value: page?.light ?? null },
     info: { value: page?.info ?? null },

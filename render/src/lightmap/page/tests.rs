@@ -13,12 +13,14 @@ const HOSTILE: &str = "</script><img src=x onerror=alert(1)>{{three}}\"'&<!--";
 
 fn manifest() -> Value {
     json!({
-        "schema": 1, "software": "luxel test", "scene": HOSTILE, "exposure": 0.5, "seed": 0,
+        "schema": 2, "software": "luxel test", "scene": HOSTILE, "exposure": 0.5, "seed": 0,
         "units": {"quantity": "irradiance", "unit": "W/m2", "factor": 1.0, "colour_space": "linear Rec. 709", "target": "three"},
         "lightmap": {
             "include": "all", "patches": 7, "energy": null,
             "error": {"luxels": 0.01, "filtering": 0.002, "total": 0.0102},
-            "pages": [{"file": "light.exr", "error": "error.exr", "luxels": "luxels.exr", "validity": "validity.png",
+            "pages": [{"file": "light.ktx2", "master": "light.exr", "error": "error.exr",
+                       "encoding": {"format": "ktx2", "formula": "texel = rgb", "scale": 1.0, "factor": 1.0, "loss": 0.0, "clamped": 0},
+                       "luxels": "luxels.exr", "validity": "validity.png",
                        "charts": "charts.png", "width": 2, "height": 1}],
         },
         "others": [],
@@ -162,7 +164,7 @@ fn other_manifests_are_refused() {
         fs::write(&path, manifest.to_string()).expect("a manifest");
         failure(folder.path())
     };
-    assert!(told(&|m| m["schema"] = json!(2)).contains("schema 2"));
+    assert!(told(&|m| m["schema"] = json!(1)).contains("schema 1"));
     assert!(told(&|m| m["schema"] = json!("new")).contains("not a manifest"));
     assert!(told(&|m| m["lightmap"]["pages"] = json!([{}])).contains("not a manifest"));
     assert!(

@@ -100,7 +100,7 @@ async function start() {
     // Nodes of several primitives are groups: what they say holds for their meshes.
     const said = [mesh, mesh.geometry, mesh.parent].map((object) => object?.userData.luxel_lightmap).find(Boolean);
     mesh.userData.page = pages[said?.page];
-    dress(mesh, mesh.userData.page, manifest.units.factor, shared);
+    dress(mesh, mesh.userData.page, shared);
   }
 
   const bounds = new THREE.Box3().setFromObject(root);
@@ -247,7 +247,7 @@ async function start() {
     const column = Math.min(Math.max(Math.floor(hit.uv1.x * page.width), 0), page.width - 1);
     const row = Math.min(Math.max(Math.floor(hit.uv1.y * page.height), 0), page.height - 1);
     const { value, error, validity } = page.at(column, row);
-    const irradiance = value.map((channel) => written(channel / manifest.units.factor)).join('  ');
+    const irradiance = value.map(written).join('  ');
     const accuracy = error === null ? '' : ` ± ${written(100 * error)} %`;
     const unit = manifest.units.unit.replace('m2', 'm²');
     const kind = validity > 200 ? '' : validity > 64 ? ', buried' : ', no surface';

@@ -10,16 +10,22 @@ render_mode unshaded;
 uniform sampler2D map : filter_linear, repeat_disable;
 uniform sampler2D albedo_map : source_color, hint_default_white;
 uniform vec4 albedo : source_color;
+uniform float scale = 1.0;
 void fragment() {
-	ALBEDO = albedo.rgb * texture(albedo_map, UV).rgb * texture(map, UV2).rgb * EXPOSURE_FACTOR;
+	vec4 texel = texture(map, UV2);
+	vec3 light = texel.rgb * {multiplier};
+	ALBEDO = albedo.rgb * texture(albedo_map, UV).rgb * light * EXPOSURE_FACTOR;
 }"
 
 ## `exposure` of manifest.json.
-@export var exposure := 1.0
+@export var exposure := {exposure}
+
+## `encoding.scale` of each page.
+const SCALES: Array[float] = [{scales}]
 
 func _ready() -> void:
 	var shader := Shader.new()
-	shader.code = SHADER.replace("EXPOSURE_FACTOR", str(exposure * PI))
+	shader.code = SHADER.replace("EXPOSURE_FACTOR", str(exposure))
 	_visit(self, shader, null)
 
 func _visit(node: Node, shader: Shader, said) -> void:
@@ -32,6 +38,7 @@ func _visit(node: Node, shader: Shader, said) -> void:
 			var material := ShaderMaterial.new()
 			material.shader = shader
 			material.set_shader_parameter("map", load("res://baked/" + said["file"]))
+			material.set_shader_parameter("scale", SCALES[int(said["page"])])
 			if old is BaseMaterial3D:
 				material.set_shader_parameter("albedo", old.albedo_color)
 				if old.albedo_texture != null:

@@ -1,7 +1,7 @@
 //! Gives a node the primitives that were made of its faces, so that what a node draws has one map.
 
 use super::Baked;
-use super::document::{Document, child_mut, object_mut, set};
+use super::document::{Document, extras_mut, object_mut, set};
 use crate::lightmap::export::pages::rectangle;
 use luxel_scenes::FaceId;
 use serde_json::{Value, json};
@@ -125,6 +125,5 @@ fn mark(item: &mut Value, lightmap: Option<&Value>) {
         }
         return;
     };
-    let extras = child_mut(item, "extras");
-    set(extras, "luxel_lightmap", lightmap.clone());
+    set(extras_mut(item), "luxel_lightmap", lightmap.clone());
 }

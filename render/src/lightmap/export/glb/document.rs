@@ -136,6 +136,16 @@ pub(super) fn child_mut<'v>(value: &'v mut Value, key: &str) -> &'v mut Value {
     object_mut(value).entry(key).or_insert_with(|| json!({}))
 }
 
+/// The extras of an item as an object. What is there and no object, which the format allows and advises against, becomes its member
+/// `extras`.
+pub(super) fn extras_mut(item: &mut Value) -> &mut Value {
+    let extras = child_mut(item, "extras");
+    if !extras.is_object() && !extras.is_null() {
+        *extras = json!({"extras": extras.take()});
+    }
+    extras
+}
+
 /// A member that is an index or a count.
 pub(super) fn index(value: &Value, key: &str) -> Option<usize> {
     usize::try_from(value.get(key)?.as_u64()?).ok()

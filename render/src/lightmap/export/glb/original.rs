@@ -7,7 +7,7 @@
 mod materials;
 mod writer;
 
-use super::document::{Document, child_mut, index, set};
+use super::document::{Document, child_mut, extras_mut, index, set};
 use super::{Baked, GlbError, compact, embed, units, views};
 use luxel_scenes::gltf_file::VertexOrigin;
 use luxel_scenes::{FaceId, GltfOrigin, MaterialId};
@@ -30,7 +30,7 @@ pub(super) fn document(baked: Baked, origin: &GltfOrigin) -> Result<Document, Gl
     let bytes = origin.read().map_err(Box::new)?;
     let mut document = embed::document(&bytes, &changed)?;
     drop(bytes);
-    let extras = child_mut(child_mut(&mut document.root, "asset"), "extras");
+    let extras = extras_mut(child_mut(&mut document.root, "asset"));
     set(extras, "luxel_units", units(baked.scene));
     let groups = groups(baked, origin).ok_or_else(|| changed("a face is not there"))?;
     let source = Source::new(&document, origin);

@@ -2,7 +2,7 @@
 //!
 //! | scene | glTF |
 //! |---|---|
-//! | diffuse reflectance, texture | base colour of a rough surface that is no metal |
+//! | diffuse reflectance, texture | base colour of a rough surface that is no metal, `KHR_materials_specular` of 0 |
 //! | mirror | base colour of a smooth metal |
 //! | glass | `KHR_materials_transmission`, `KHR_materials_ior` |
 //! | emission up to one, above | emissive factor, times `KHR_materials_emissive_strength` |
@@ -10,7 +10,9 @@
 //!
 //! Emission keeps the unit that the scene counts in, so that it agrees with the maps. Textures become PNG in 8-bit sRGB; one with
 //! values above one is divided by its largest, by which factors are multiplied. Highlights of Phong's kind have no like and are left out.
-//! Sources: glTF 2.0, chapter 3.9; IEC 61966-2-1 (sRGB). Cost: linear in the texels.
+//! The format's surfaces mirror 4 % of what comes from ahead and reflect the less of it diffusely, unless `specularFactor` is 0: matt ones
+//! have to say so, or are shown darker than they are baked. Readers that do not know the extension show them as before.
+//! Sources: glTF 2.0, chapter 3.9 and appendix B; `KHR_materials_specular`; IEC 61966-2-1 (sRGB). Cost: linear in the texels.
 
 use super::GlbError;
 use super::document::{Document, child_mut, set};
@@ -24,6 +26,7 @@ use serde_json::{Value, json};
 const STRENGTH: &str = "KHR_materials_emissive_strength";
 const TRANSMISSION: &str = "KHR_materials_transmission";
 const REFRACTION: &str = "KHR_materials_ior";
+const GLOSS: &str = "KHR_materials_specular";
 
 /// The scene's materials and textures that a document has so far.
 pub(super) struct Surfaces<'s> {
@@ -80,6 +83,11 @@ impl<'s> Surfaces<'s> {
         set(shine, "roughnessFactor", u8::from(!is_mirror));
         if let Some(Written { index, .. }) = emission {
             set(&mut value, "emissiveTexture", json!({"index": index}));
+        }
+        if material.specular == Specular::None {
+            let extensions = child_mut(&mut value, "extensions");
+            set(extensions, GLOSS, json!({"specularFactor": 0.0}));
+            document.use_extension(GLOSS);
         }
         if let Specular::Glass {
             index_of_refraction,

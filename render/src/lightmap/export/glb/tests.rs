@@ -343,6 +343,12 @@ fn a_scene_without_a_document_gets_one() {
     }
     let (old, new) = (&scene.cameras[0], &again.cameras[0]);
     assert!(old.position.distance(new.position) < 1e-6);
+    let (document, _) = parts(&file);
+    for material in items(&document, "materials") {
+        let gloss = &material["extensions"]["KHR_materials_specular"];
+        assert_eq!(gloss["specularFactor"], 0.0, "matt: {material}");
+    }
+    assert!(document.get("extensionsRequired").is_none());
 }
 
 #[test]

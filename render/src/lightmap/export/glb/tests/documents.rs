@@ -124,6 +124,40 @@ fn strips_become_triangles_and_lines_stay() {
     assert!(primitive["attributes"].get("TEXCOORD_2").is_none());
 }
 
+/// The format advises that extras are objects, and allows everything: readers for numbers and lists are there, too.
+#[test]
+fn extras_of_all_kinds_are_kept() {
+    for extras in [
+        json!(5),
+        json!("text"),
+        json!([1, {"a": 2.5}]),
+        json!(true),
+        json!({"own": 1}),
+    ] {
+        let (mut document, bytes) = document();
+        document["meshes"][0]["primitives"]
+            .as_array_mut()
+            .expect("primitives")
+            .pop();
+        for place in ["/asset", "/nodes/0", "/meshes/0", "/meshes/0/primitives/0"] {
+            let item = document.pointer_mut(place).expect("it is there");
+            item["extras"] = extras.clone();
+        }
+        let (written, _, _) = written(&document, &bytes, &[Some(0), Some(0)]);
+        for place in ["/meshes/0/extras", "/meshes/0/primitives/0/extras"] {
+            assert_eq!(written.pointer(place), Some(&extras), "{place}");
+        }
+        let [asset, node] = [&written["asset"], &written["nodes"][0]].map(|own| &own["extras"]);
+        assert_eq!(node["luxel_lightmap"]["page"], 0);
+        // What was no object is a member beside luxel's own.
+        let expected = extras.get("own").unwrap_or(&extras);
+        for marked in [asset, node] {
+            let kept = if extras.is_object() { "own" } else { "extras" };
+            assert_eq!(marked[kept], *expected);
+        }
+    }
+}
+
 #[test]
 fn morph_targets_keep_a_node_whole() {
     let (mut document, bytes) = document();
