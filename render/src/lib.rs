@@ -30,3 +30,4 @@ pub mod report;
 pub mod solution;
 pub mod tone_map;
 pub mod view;
+pub mod volume;

@@ -10,6 +10,7 @@ pub mod atlas;
 pub mod bake;
 pub mod denoise;
 pub mod dilation;
+pub mod directional;
 pub mod export;
 pub mod fit;
 pub mod given;

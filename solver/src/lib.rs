@@ -38,4 +38,6 @@ pub mod gather;
 
 pub mod adaptive;
 
+pub mod incident;
+
 pub mod audit;

@@ -5,6 +5,7 @@ mod ambient_occlusion;
 mod bad_input;
 mod cie171;
 mod determinism;
+mod directional;
 mod enclosures;
 mod extremes;
 mod form_factors;

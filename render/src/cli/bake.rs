@@ -1,9 +1,11 @@
 //! `luxel bake`: lightmaps.
 
 mod deliver;
+mod directional;
 mod footprint;
 mod gathered;
 mod places;
+mod volume;
 
 use super::exit::{ExitCode, Failure};
 use super::footprint::Footprint;
@@ -20,11 +22,13 @@ use crate::lightmap::manifest::{self, Manifest};
 use crate::lightmap::target::Target;
 use clap::ValueEnum;
 use deliver::Delivery;
+use directional::{Directional, DirectionalMaps};
 use gathered::AtLuxels;
 use luxel_scenes::Scene;
 use luxel_solver::gather::Components;
 use luxel_solver::world::World;
 use std::path::PathBuf;
+use volume::{BakedVolume, VolumeOptions};
 
 /// Bake the light of a scene into textures
 ///
@@ -93,6 +97,13 @@ pub(super) struct Bake {
     /// What smooths the noise that is left; the maps of luxels stay as they were gathered
     #[arg(long, value_enum, default_value = "builtin", value_name = "HOW")]
     denoise: Denoise,
+
+    /// Maps of where the light comes from, beside those of the light: for normal maps
+    #[arg(long, value_enum, default_value = "none", value_name = "HOW")]
+    directional: Directional,
+
+    #[command(flatten)]
+    volume: VolumeOptions,
 }
 
 /// What smooths noise.
@@ -134,12 +145,30 @@ struct Baked {
     atlas: Atlas,
     luxels: Luxels,
     layers: Vec<Layer>,
+    volume: Option<BakedVolume>,
+}
+
+impl Baked {
+    /// All errors that are stated, by what they belong to.
+    fn stated(&self) -> impl Iterator<Item = (String, &StatedError)> {
+        let of_layers = self.layers.iter().flat_map(|layer| {
+            let include = super::name(&layer.include);
+            let directional = layer.directional.as_ref();
+            let directions =
+                directional.map(|maps| (format!("directions of {include}"), &maps.stated));
+            std::iter::once((include, &layer.stated)).chain(directions)
+        });
+        let volume = self.volume.iter();
+        of_layers.chain(volume.map(|volume| ("volume".to_owned(), &volume.stated)))
+    }
 }
 
 /// One set of maps.
 struct Layer {
     include: Include,
     maps: Finished,
+    /// Where its light comes from.
+    directional: Option<DirectionalMaps>,
     /// The error of luxels by its parts, and what bilinear filtering adds.
     stated: StatedError,
     error: manifest::Error,
@@ -174,21 +203,27 @@ impl Bake {
                 seed: context.common.seed,
             };
             let manifest = delivery.write()?;
-            Ok::<_, Failure>(Some((manifest, baked.layers)))
+            Ok::<_, Failure>(Some((manifest, baked)))
         })??;
-        let Some((manifest, layers)) = delivered else {
+        let Some((manifest, baked)) = delivered else {
             return Ok(ExitCode::Interrupted);
         };
-        self.report(&manifest, &layers, &goal, session)?;
-        let missed = layers
-            .iter()
-            .map(|layer| layer.stated.exit(Some(&goal)))
+        self.report(&manifest, &baked, &goal, session)?;
+        let missed = baked
+            .stated()
+            .map(|(_, stated)| stated.exit(Some(&goal)))
             .find(|exit| *exit != ExitCode::Ok);
         Ok(if session.context.interrupt.is_set() {
             ExitCode::Interrupted
         } else {
             missed.unwrap_or(ExitCode::Ok)
         })
+    }
+
+    /// Whether any map is one of light.
+    fn bakes_light(&self) -> bool {
+        let mut include = self.include.iter();
+        include.any(|include| include.components().is_some())
     }
 
     /// Refuses options that would have no effect.
@@ -200,6 +235,12 @@ impl Bake {
             "--max-distance belongs to --include ao"
         } else if kinds.len() < self.include.len() {
             "--include names the same twice"
+        } else if !self.bakes_light() && self.directional != Directional::None {
+            "--directional belongs to maps of light, not to --include ao alone"
+        } else if !self.bakes_light() && self.volume.resolution().is_some() {
+            "volumes hold the light of the first map of light; --include ao alone has none"
+        } else if let Some(problem) = self.volume.problem() {
+            problem
         } else {
             return Ok(());
         };
@@ -210,19 +251,31 @@ impl Bake {
     fn report(
         &self,
         manifest: &Manifest,
-        layers: &[Layer],
+        baked: &Baked,
         goal: &Goal,
         session: &mut Session<'_>,
     ) -> Result<(), Failure> {
         let context = &session.context;
         let seconds = context.started.elapsed().as_secs_f64();
-        for layer in layers {
+        for layer in &baked.layers {
             context.reporter.note(format_args!(
                 "{}: {}; between texels filtering leaves {:.2} %",
                 super::name(&layer.include),
                 layer.stated.summary(Some(goal)),
                 100.0 * layer.error.filtering,
             ));
+            if let Some(directional) = &layer.directional {
+                context.reporter.note(format_args!(
+                    "directions of {}: {}",
+                    super::name(&layer.include),
+                    directional.stated.summary(Some(goal))
+                ));
+            }
+        }
+        if let Some(volume) = &baked.volume {
+            context
+                .reporter
+                .note(format_args!("{}", volume.summary(goal)));
         }
         context.reporter.note(format_args!(
             "{} luxels on {} page(s) of {} × {}, {:.1} texels a metre, {seconds:.2} s{}",
@@ -242,14 +295,9 @@ impl Bake {
         let text = if context.common.json {
             let mut json = serde_json::to_value(manifest)?;
             json["seconds"] = seconds.into();
-            json["stated"] = layers
-                .iter()
-                .map(|layer| {
-                    (
-                        super::name(&layer.include),
-                        layer.stated.to_json(Some(goal)),
-                    )
-                })
+            json["stated"] = baked
+                .stated()
+                .map(|(what, stated)| (what, stated.to_json(Some(goal))))
                 .collect::<serde_json::Map<_, _>>()
                 .into();
             memory::add_peak(&mut json);
@@ -283,8 +331,14 @@ impl Bake {
                 ),
             ));
         }
+        let grid = self.volume.grid(world.scene())?;
+        let of_layer = 1 + usize::from(self.directional != Directional::None);
+        let passes = of_layer * self.include.len() + usize::from(grid.is_some());
         let mut layers = Vec::new();
         for &include in &self.include {
+            let done = of_layer * layers.len();
+            let whole = goal;
+            let goal = &whole.part(done + 1, passes);
             let gathered = match include.components() {
                 Some(components) => self.light(world, &luxels, components, &held, goal, context)?,
                 None => self.occlusion(world, &luxels, goal, context),
@@ -292,12 +346,38 @@ impl Bake {
             let Some(gathered) = gathered else {
                 return Ok(None);
             };
-            layers.push(self.layer(world, &atlas, &luxels, include, gathered));
+            let mut layer = self.layer(world, &atlas, &luxels, include, gathered);
+            if self.directional != Directional::None
+                && let Some(light) = include.components()
+            {
+                let goal = &whole.part(done + 2, passes);
+                let found =
+                    self.directions(world, &atlas, &luxels, &layer, light, &held, goal, context)?;
+                if found.is_none() {
+                    return Ok(None);
+                }
+                layer.directional = found;
+            }
+            layers.push(layer);
+        }
+        let mut volume = None;
+        if let Some(grid) = grid {
+            let lit = layers
+                .iter()
+                .find_map(|layer| Some((layer, layer.include.components()?)));
+            let (layer, components) = lit.expect("options were checked: some map is of light");
+            let include = super::name(&layer.include);
+            let light = (include.as_str(), components, layer.patches);
+            volume = self.volume(world, grid, light, &held, goal, context)?;
+            if volume.is_none() {
+                return Ok(None);
+            }
         }
         Ok(Some(Baked {
             atlas,
             luxels,
             layers,
+            volume,
         }))
     }
 
@@ -319,6 +399,7 @@ impl Bake {
         Layer {
             include,
             maps,
+            directional: None,
             stated: gathered.stated,
             error: manifest::Error {
                 luxels: of_luxels,

@@ -44,6 +44,16 @@ impl Goal {
         }
     }
 
+    /// The goal of the first `done` of several pieces of work that have to be finished in the same time.
+    pub(super) fn part(&self, done: usize, of: usize) -> Self {
+        let share = done as f64 / of as f64;
+        let deadline = self.deadline.map(|deadline| Deadline {
+            time: deadline.time.mul_f64(share),
+            ..deadline
+        });
+        Self { deadline, ..*self }
+    }
+
     /// Whether an estimated relative error is what was asked for. False for `NaN`, and without an
     /// error to reach.
     pub(super) fn is_met_by(&self, estimate: f64) -> bool {

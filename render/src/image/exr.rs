@@ -121,6 +121,28 @@ pub fn encode(picture: &Picture) -> Result<Vec<u8>, EncodeExrError> {
     Ok(bytes.into_inner())
 }
 
+/// The bytes of an EXR file of the channels R, G, B and A, row by row, `size` being width and height.
+///
+/// # Errors
+/// When the encoder refuses: there are not as many pixels as the size says.
+pub fn encode_rgba(size: [usize; 2], pixels: &[[f32; 4]]) -> Result<Vec<u8>, EncodeExrError> {
+    let channels = ["R", "G", "B", "A"].into_iter().enumerate();
+    let channels = channels.map(|(index, name)| {
+        let samples = pixels.iter().map(|pixel| pixel[index]).collect();
+        AnyChannel::new(text(name), FlatSamples::F32(samples))
+    });
+    let layer = Layer::new(
+        Vec2(size[0], size[1]),
+        LayerAttributes::default(),
+        Encoding::SMALL_LOSSLESS,
+        AnyChannels::sort(channels.collect()),
+    );
+    let image = exr::prelude::Image::from_layer(layer);
+    let mut bytes = Cursor::new(Vec::new());
+    image.write().non_parallel().to_buffered(&mut bytes)?;
+    Ok(bytes.into_inner())
+}
+
 /// Reads an EXR file: the first layer that has R, G and B, with its prefixed layers.
 ///
 /// # Errors

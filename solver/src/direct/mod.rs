@@ -18,4 +18,5 @@ pub(crate) use dome::{Dome, DomeRays};
 pub use kernel::Luminaire;
 pub use lights::{Distribution, Lights, Source};
 pub use lit::Lit;
+pub(crate) use sampler::systematic;
 pub use sampler::{DirectSampler, Sample, ShadowRays};

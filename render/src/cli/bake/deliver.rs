@@ -54,7 +54,15 @@ impl Delivery<'_> {
             };
             let pages: Vec<Page> = (0..atlas.pages).map(|page| self.page(stem, page)).collect();
             self.write_maps(layer, &pages)?;
+            let directional = match &layer.directional {
+                Some(maps) => {
+                    let factor = self.target.quantity().factor();
+                    Some(maps.write(self.folder, stem, &layer.maps.map, factor)?)
+                }
+                None => None,
+            };
             described.push(manifest::Layer {
+                directional,
                 include,
                 pages,
                 error: layer.error,
@@ -74,6 +82,14 @@ impl Delivery<'_> {
             let validity = png::encode_grey8(&raw.validity(index), atlas.size)?;
             self.folder.write(&page.validity, &validity)?;
         }
+        let volume = match &self.baked.volume {
+            Some(volume) => Some(volume.write(self.folder)?),
+            None => {
+                // That of an older bake is of another scene.
+                self.folder.remove(crate::volume::file::HEADER)?;
+                None
+            }
+        };
         let files = lightmap.pages.iter().map(|page| page.file.clone());
         let files: Vec<String> = files.collect();
         self.folder
@@ -85,7 +101,9 @@ impl Delivery<'_> {
         let tone_map = ToneMap::automatic(&preview);
         self.folder
             .write("preview.png", &png::encode(&preview, tone_map)?)?;
-        let manifest = self.manifest(lightmap, described.collect(), f64::from(tone_map.exposure));
+        let mut manifest =
+            self.manifest(lightmap, described.collect(), f64::from(tone_map.exposure));
+        manifest.volume = volume;
         if let Some((name, text)) = self.target.snippet() {
             let exposure = manifest.bevy.map_or(1.0, |bevy| bevy.lightmap_exposure);
             let text = text.replace("{lightmap_exposure}", &format!("{exposure:?}"));
@@ -212,13 +230,14 @@ impl Delivery<'_> {
                 preview: "preview.png".into(),
             },
             bevy: (self.target == Target::Bevy).then(|| Bevy::new(scene.units, exposure)),
+            volume: None,
             seed: self.seed,
         }
     }
 }
 
 /// A picture that needs no word on its origin: the manifest has it.
-fn picture_of(image: Image, layers: Vec<(String, Image)>) -> Picture {
+pub(super) fn picture_of(image: Image, layers: Vec<(String, Image)>) -> Picture {
     Picture {
         image,
         layers,

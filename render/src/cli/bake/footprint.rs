@@ -1,6 +1,6 @@
 //! What a bake holds.
 
-use super::{Bake, Include};
+use super::{Bake, Directional, Include};
 use crate::cli::Context;
 use crate::cli::exit::Failure;
 use crate::cli::footprint::{Footprint, larger_error};
@@ -8,6 +8,7 @@ use crate::cli::goal::Goal;
 use crate::cli::steering::first_error;
 use crate::image::exr::Picture;
 use crate::lightmap::atlas::Atlas;
+use crate::lightmap::directional;
 use crate::lightmap::luxels::{self, Luxel};
 use crate::lightmap::map::Lightmap;
 use luxel_solver::adaptive;
@@ -43,12 +44,21 @@ impl Bake {
         let texels = atlas.texels();
         let page = atlas.size[0] * atlas.size[1];
         let found = luxels * (size_of::<Luxel>() + size_of::<Receiver>() + size_of::<Gathered>());
+        let has_directions = self.directional != Directional::None;
+        let directions = if has_directions {
+            directional::bytes_to_gather(luxels) + directional::bytes_for(texels)
+        } else {
+            0
+        };
+        let grid = self.volume.grid(world.scene())?;
+        let volume = grid.map_or(0, |grid| self.volume.bytes(&grid));
         let held = Footprint::of(world)
             .with("luxels", found.max(luxels::bytes_to_find(texels)))
             .with(
                 "what is gathered at them",
-                adaptive::bytes_to_gather(luxels),
+                adaptive::bytes_to_gather(luxels).max(directions),
             )
+            .with("the irradiance volume", volume)
             .with(
                 "maps",
                 2 * self.include.len() * Lightmap::bytes_for(texels)

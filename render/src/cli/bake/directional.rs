@@ -1,0 +1,186 @@
+//! `--directional`: where the light of luxels comes from.
+
+use super::{Bake, Layer};
+use crate::cli::Context;
+use crate::cli::exit::Failure;
+use crate::cli::footprint::{Footprint, held_back};
+use crate::cli::goal::Goal;
+use crate::cli::stated::StatedError;
+use crate::cli::steering::{Steering, first_error};
+use crate::files::OutputFolder;
+use crate::image::exr;
+use crate::lightmap::atlas::Atlas;
+use crate::lightmap::bake::Luxels;
+use crate::lightmap::directional::{self, Directions};
+use crate::lightmap::manifest;
+use crate::lightmap::map::Lightmap;
+use clap::ValueEnum;
+use luxel_scenes::Rgb;
+use luxel_solver::gather::Components;
+use luxel_solver::incident::Aim;
+use luxel_solver::world::World;
+use rayon::prelude::*;
+
+/// What maps of light say of its directions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Directional {
+    /// Nothing
+    None,
+    /// Spherical harmonics of degree one, four maps, in the axes of the scene
+    Sh1,
+    /// The dominant direction and how much of the light comes from it, one map
+    Dominant,
+}
+
+/// Maps of directions with their error.
+pub(super) struct DirectionalMaps {
+    kind: Directional,
+    maps: Directions,
+    pub(super) stated: StatedError,
+}
+
+/// The maps of [`Directional::Sh1`]: a₀ and a along each axis.
+const OF_SH1: [&str; directional::COEFFICIENTS] = ["sh1_0", "sh1_x", "sh1_y", "sh1_z"];
+
+impl Bake {
+    /// Directions of the light of a layer, begun with as many patches as it has; `Ok(None)` when it was stopped before there were any.
+    pub(super) fn directions(
+        &self,
+        world: &World<'_>,
+        atlas: &Atlas,
+        luxels: &Luxels,
+        layer: &Layer,
+        components: Components,
+        held: &Footprint,
+        goal: &Goal,
+        context: &Context<'_>,
+    ) -> Result<Option<DirectionalMaps>, Failure> {
+        let aim = self.aim(world, layer.patches, components, held, goal, context);
+        let mut steering = Steering::new(context, Some(goal));
+        let Some(found) = directional::gather(world, luxels, &aim, &mut steering)? else {
+            return Ok(None);
+        };
+        context.reporter.detail(format_args!(
+            "directions: {} gather and {} shadow rays a luxel",
+            found.rays[0], found.rays[1]
+        ));
+        Ok(Some(DirectionalMaps {
+            kind: self.directional,
+            maps: directional::maps(atlas, luxels, &found.estimates, &layer.maps.map),
+            stated: StatedError::of_gather(&found.parts, 0.0),
+        }))
+    }
+
+    /// What is asked of incident radiance, begun with so many patches.
+    pub(super) fn aim(
+        &self,
+        world: &World<'_>,
+        patches: usize,
+        components: Components,
+        held: &Footprint,
+        goal: &Goal,
+        context: &Context<'_>,
+    ) -> Aim {
+        let error = first_error(Some(goal));
+        let first = patches.max(self.first_patches(error));
+        Aim {
+            error,
+            components,
+            first_rays: 1,
+            patches: [first, held.most_patches(world.scene(), first, context)],
+            seed: context.common.seed,
+        }
+    }
+}
+
+impl DirectionalMaps {
+    /// Writes the files of all pages and says what they are. `factor` is what E is multiplied with in `map`'s files.
+    pub(super) fn write(
+        &self,
+        folder: &OutputFolder,
+        stem: &str,
+        map: &Lightmap,
+        factor: f64,
+    ) -> Result<manifest::Directional, Failure> {
+        let scaled = |values: &[Rgb]| -> Vec<Rgb> { values.iter().map(|v| *v * factor).collect() };
+        let sets: Vec<(&str, Vec<Rgb>)> = match self.kind {
+            Directional::Sh1 => {
+                let values = self.maps.coefficients.iter().map(|values| scaled(values));
+                let mut sets: Vec<_> = OF_SH1.into_iter().zip(values).collect();
+                sets.push(("sh1_error", scaled(&self.maps.errors)));
+                sets
+            }
+            Directional::Dominant | Directional::None => Vec::new(),
+        };
+        let name = |page: usize, what: &str| format!("{stem}_{page:03}_{what}.exr");
+        let files: Vec<(String, usize, &[Rgb])> = sets
+            .iter()
+            .flat_map(|(what, values)| {
+                (0..map.pages).map(|page| (name(page, what), page, values.as_slice()))
+            })
+            .collect();
+        files.par_iter().try_for_each(|(file, page, values)| {
+            let picture = super::deliver::picture_of(map.page(*page, values), vec![]);
+            folder.write(file, &exr::encode(&picture)?)?;
+            Ok::<_, Failure>(())
+        })?;
+        if self.kind == Directional::Dominant {
+            let texels = self.maps.dominant(map);
+            for (page, own) in texels.chunks_exact(map.page_texels()).enumerate() {
+                let bytes = exr::encode_rgba(map.size, own)?;
+                folder.write(&name(page, "dominant"), &bytes)?;
+            }
+        }
+        let pages = (0..map.pages).map(|page| match self.kind {
+            Directional::Sh1 => manifest::DirectionalPage {
+                files: OF_SH1.map(|what| name(page, what)).to_vec(),
+                error: Some(name(page, "sh1_error")),
+            },
+            Directional::Dominant | Directional::None => manifest::DirectionalPage {
+                files: vec![name(page, "dominant")],
+                error: None,
+            },
+        });
+        let [mean, spread] = self.maps.ratio;
+        Ok(manifest::Directional {
+            kind: crate::cli::name(&self.kind),
+            axes: "those of scene.glb; normals are unit vectors in them".into(),
+            pages: pages.collect(),
+            texel: match self.kind {
+                Directional::Sh1 => SH1_TEXEL.map(String::from).to_vec(),
+                Directional::Dominant | Directional::None => {
+                    DOMINANT_TEXEL.map(String::from).to_vec()
+                }
+            },
+            decode: match self.kind {
+                Directional::Sh1 => SH1_DECODE.map(String::from).to_vec(),
+                Directional::Dominant | Directional::None => {
+                    DOMINANT_DECODE.map(String::from).to_vec()
+                }
+            },
+            ratio: (self.kind == Directional::Sh1).then_some(manifest::Ratio { mean, spread }),
+            error: self.stated.total(),
+        })
+    }
+}
+
+/// What the texels of the manifest's files hold.
+const SH1_TEXEL: [&str; 3] = [
+    "files[0]: a0 = integral of L dw / 4 over the hemisphere above the texel, times units.factor, by channel",
+    "files[1..4]: a = (ax, ay, az) = integral of L w dw / 2, times units.factor, by channel, signed",
+    "spherical harmonics of L: c00 = a0 / (units.factor 0.886226925), (c1-1, c10, c11) = (ay, az, ax) / (units.factor 1.023326708)",
+];
+const DOMINANT_TEXEL: [&str; 2] = [
+    "RGB: 0.5 + 0.5 D, with D = integral of L w dw / integral of L dw, L in luminance (0.2126, 0.7152, 0.0722): direction D/|D|, directionality |D|",
+    "A: w = 0.5 + 0.5 dot(n, D), n being the normal that the map was gathered at",
+];
+
+/// How they are read: E is the texel of the map, m the mapped normal.
+const SH1_DECODE: [&str; 3] = [
+    "exact at the surface normal n: texel(m) = map max(0, a0 + dot(m, a)) / (a0 + dot(n, a)); dot(n, a) = map / 2",
+    "linear: texel(m) = max(0, a0 + dot(m, a)), which is map times ratio at n",
+    "Geomerics: R0 = a0, R1 = |a| / 2, q = (1 + dot(m, a) / |a|) / 2, p = 1 + 2 R1 / R0, k = (1 - R1 / R0) / (1 + R1 / R0), texel(m) = R0 (k + (1 - k) (p + 1) q^p)",
+];
+const DOMINANT_DECODE: [&str; 1] = [
+    "texel(m) = map (dot(m, RGB - 0.5) + 0.5) / max(A, 0.0001), which is map at the surface normal (Unity's directional mode)",
+];
