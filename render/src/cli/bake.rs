@@ -13,6 +13,7 @@ use super::goal::Goal;
 use super::memory;
 use super::scene;
 use super::stated::StatedError;
+use super::steering::first_error;
 use super::{Context, Session};
 use crate::files::OutputFolder;
 use crate::integrators::ao::Falloff;
@@ -22,7 +23,7 @@ use crate::lightmap::manifest::{self, Manifest};
 use crate::lightmap::target::Target;
 use clap::ValueEnum;
 use deliver::Delivery;
-use directional::{Directional, DirectionalMaps};
+use directional::{Directional, DirectionalMaps, Pass};
 use gathered::AtLuxels;
 use luxel_scenes::Scene;
 use luxel_solver::gather::Components;
@@ -350,9 +351,15 @@ impl Bake {
             if self.directional != Directional::None
                 && let Some(light) = include.components()
             {
-                let goal = &whole.part(done + 2, passes);
-                let found =
-                    self.directions(world, &atlas, &luxels, &layer, light, &held, goal, context)?;
+                let pass = Pass {
+                    world,
+                    held: &held,
+                    goal: &whole.part(done + 2, passes),
+                    context,
+                    components: light,
+                    patches: self.patches(&layer, whole),
+                };
+                let found = self.directions(&pass, &atlas, &luxels, &layer)?;
                 if found.is_none() {
                     return Ok(None);
                 }
@@ -367,8 +374,15 @@ impl Bake {
                 .find_map(|layer| Some((layer, layer.include.components()?)));
             let (layer, components) = lit.expect("options were checked: some map is of light");
             let include = super::name(&layer.include);
-            let light = (include.as_str(), components, layer.patches);
-            volume = self.volume(world, grid, light, &held, goal, context)?;
+            let pass = Pass {
+                world,
+                held: &held,
+                goal,
+                context,
+                components,
+                patches: self.patches(layer, goal),
+            };
+            volume = self.volume(&pass, grid, &include)?;
             if volume.is_none() {
                 return Ok(None);
             }
@@ -379,6 +393,12 @@ impl Bake {
             layers,
             volume,
         }))
+    }
+
+    /// Patches with which more is begun about the light of a layer.
+    fn patches(&self, layer: &Layer, goal: &Goal) -> usize {
+        let first = self.first_patches(first_error(Some(goal)));
+        layer.patches.max(first)
     }
 
     /// Makes maps of what was gathered.

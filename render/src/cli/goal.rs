@@ -147,5 +147,9 @@ mod tests {
         let both = Goal::new(Some(RelativeError(0.5)), Some(hour), started);
         assert!(both.is_met_by(0.5) && both.time_left() <= Some(hour));
         assert_eq!(Goal::new(None, None, started).time_left(), None);
+        // A third of the time for the first of three, all of it for the last, and the same error.
+        let [third, all] = [1, 3].map(|done| both.part(done, 3));
+        assert!(third.time_left() <= Some(hour / 3) && third.is_met_by(0.5));
+        assert_eq!(all.deadline, both.deadline);
     }
 }

@@ -66,9 +66,11 @@ pub fn gather(
         ..*aim
     };
     let treat = |incidents: Vec<Incident<COEFFICIENTS>>| {
-        let joined = joined(world, receivers, &incidents);
-        let given = joined.iter().zip(receivers);
-        given.map(|(i, r)| i.given_irradiance(r.normal)).collect()
+        let mut joined = joined(world, receivers, &incidents);
+        for (incident, receiver) in joined.iter_mut().zip(receivers) {
+            *incident = incident.given_irradiance(receiver.normal);
+        }
+        joined
     };
     let found = until(world, &places, &aim, &treat, control)?;
     Ok(found.map(|found| Gathered {

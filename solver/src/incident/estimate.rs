@@ -1,7 +1,7 @@
 //! Coefficients with their errors, and the error of the irradiance that they describe.
 //!
-//! The scatter of four replicates is that of all noise. The coefficients of one place are noisy alike (the basis is orthonormal), so that
-//! scatters are [moderated](crate::error::moderate) towards their mean. What patches of finite size leave is judged from the difference from a coarser
+//! The scatter of four replicates is that of all noise. Where one coefficient of a place is noisy the others are too, so that the scatters of each
+//! are [moderated](crate::error::moderate) towards a share of the sum of them all, the same everywhere. What patches of finite size leave is judged from the difference from a coarser
 //! mesh ([`crate::error::discretisation`]). Because the basis is orthonormal, the variance of E(n), the mean over all n, follows from those of the coefficients
 //! without their covariances ([`harmonics::mean_square`](super::harmonics::mean_square)): it is what errors of all places together are made of.
 
@@ -130,19 +130,16 @@ pub fn finish<const N: usize>(incidents: &[Incident<N>]) -> Vec<Estimate<N>> {
         })
         .collect();
     for channel in 0..3 {
-        let own: Vec<f64> = scatters.iter().flatten().map(|s| s[channel]).collect();
-        let usual: Vec<f64> = own
-            .chunks_exact(N)
-            .flat_map(|row| [row.iter().sum::<f64>() / N as f64; N])
+        let usual: Vec<f64> = scatters
+            .iter()
+            .map(|row| row.iter().map(|s| s[channel]).sum())
             .collect();
-        let noise = moderate(&own, &usual, MAX_REPLICATES as u32 - 1);
-        for ((estimate, noise), mesh) in estimates
-            .iter_mut()
-            .zip(noise.chunks_exact(N))
-            .zip(&of_patches)
-        {
-            for k in 0..N {
-                estimate.standard_error[k][channel] = (noise[k] + mesh[k][channel]).sqrt();
+        for k in 0..N {
+            let own: Vec<f64> = scatters.iter().map(|row| row[k][channel]).collect();
+            let noise = moderate(&own, &usual, MAX_REPLICATES as u32 - 1);
+            let places = estimates.iter_mut().zip(noise).zip(&of_patches);
+            for ((estimate, noise), mesh) in places {
+                estimate.standard_error[k][channel] = (noise + mesh[k][channel]).sqrt();
             }
         }
     }

@@ -98,6 +98,8 @@ pub fn until<const N: usize>(
         if !gathering.go_on(lookup.as_ref(), rays, control) {
             return Ok(outcome);
         }
+        // What the last round made is not needed any more: many places would be held once more.
+        drop(outcome.take());
         let incidents = treatment(gathering.incidents.clone());
         let parts = error_parts(&incidents);
         outcome = Some(Outcome {

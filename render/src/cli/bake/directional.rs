@@ -3,7 +3,7 @@
 use super::{Bake, Layer};
 use crate::cli::Context;
 use crate::cli::exit::Failure;
-use crate::cli::footprint::{Footprint, held_back};
+use crate::cli::footprint::Footprint;
 use crate::cli::goal::Goal;
 use crate::cli::stated::StatedError;
 use crate::cli::steering::{Steering, first_error};
@@ -42,25 +42,51 @@ pub(super) struct DirectionalMaps {
 /// The maps of [`Directional::Sh1`]: a₀ and a along each axis.
 const OF_SH1: [&str; directional::COEFFICIENTS] = ["sh1_0", "sh1_x", "sh1_y", "sh1_z"];
 
+/// What a pass over incident radiance works with.
+#[derive(Clone, Copy)]
+pub(super) struct Pass<'a, 's, 'r> {
+    pub(super) world: &'a World<'s>,
+    /// What else is held.
+    pub(super) held: &'a Footprint,
+    /// When it ends.
+    pub(super) goal: &'a Goal,
+    pub(super) context: &'a Context<'r>,
+    /// Which light.
+    pub(super) components: Components,
+    /// Patches that are begun with.
+    pub(super) patches: usize,
+}
+
+impl Pass<'_, '_, '_> {
+    /// What is asked of incident radiance.
+    pub(super) fn aim(&self) -> Aim {
+        let scene = self.world.scene();
+        let most = self.held.most_patches(scene, self.patches, self.context);
+        Aim {
+            error: first_error(Some(self.goal)),
+            components: self.components,
+            first_rays: 1,
+            patches: [self.patches, most],
+            seed: self.context.common.seed,
+        }
+    }
+}
+
 impl Bake {
-    /// Directions of the light of a layer, begun with as many patches as it has; `Ok(None)` when it was stopped before there were any.
+    /// Directions of the light of a layer; `Ok(None)` when it was stopped before there were any.
     pub(super) fn directions(
         &self,
-        world: &World<'_>,
+        pass: &Pass<'_, '_, '_>,
         atlas: &Atlas,
         luxels: &Luxels,
         layer: &Layer,
-        components: Components,
-        held: &Footprint,
-        goal: &Goal,
-        context: &Context<'_>,
     ) -> Result<Option<DirectionalMaps>, Failure> {
-        let aim = self.aim(world, layer.patches, components, held, goal, context);
-        let mut steering = Steering::new(context, Some(goal));
-        let Some(found) = directional::gather(world, luxels, &aim, &mut steering)? else {
+        let mut steering = Steering::new(pass.context, Some(pass.goal));
+        let found = directional::gather(pass.world, luxels, &pass.aim(), &mut steering)?;
+        let Some(found) = found else {
             return Ok(None);
         };
-        context.reporter.detail(format_args!(
+        pass.context.reporter.detail(format_args!(
             "directions: {} gather and {} shadow rays a luxel",
             found.rays[0], found.rays[1]
         ));
@@ -69,27 +95,6 @@ impl Bake {
             maps: directional::maps(atlas, luxels, &found.estimates, &layer.maps.map),
             stated: StatedError::of_gather(&found.parts, 0.0),
         }))
-    }
-
-    /// What is asked of incident radiance, begun with so many patches.
-    pub(super) fn aim(
-        &self,
-        world: &World<'_>,
-        patches: usize,
-        components: Components,
-        held: &Footprint,
-        goal: &Goal,
-        context: &Context<'_>,
-    ) -> Aim {
-        let error = first_error(Some(goal));
-        let first = patches.max(self.first_patches(error));
-        Aim {
-            error,
-            components,
-            first_rays: 1,
-            patches: [first, held.most_patches(world.scene(), first, context)],
-            seed: context.common.seed,
-        }
     }
 }
 
@@ -165,10 +170,11 @@ impl DirectionalMaps {
 }
 
 /// What the texels of the manifest's files hold.
-const SH1_TEXEL: [&str; 3] = [
+const SH1_TEXEL: [&str; 4] = [
     "files[0]: a0 = integral of L dw / 4 over the hemisphere above the texel, times units.factor, by channel",
     "files[1..4]: a = (ax, ay, az) = integral of L w dw / 2, times units.factor, by channel, signed",
     "spherical harmonics of L: c00 = a0 / (units.factor 0.886226925), (c1-1, c10, c11) = (ay, az, ax) / (units.factor 1.023326708)",
+    "encoded: Bakery's L0 is a0 and its L1 textures 0.5 + a / (4 a0); Godot's layers are a0 and 0.5 + a / (8 a0) for y, z, x; both want E/pi (--for godot, unity)",
 ];
 const DOMINANT_TEXEL: [&str; 2] = [
     "RGB: 0.5 + 0.5 D, with D = integral of L w dw / integral of L dw, L in luminance (0.2126, 0.7152, 0.0722): direction D/|D|, directionality |D|",

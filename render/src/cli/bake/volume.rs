@@ -1,20 +1,18 @@
 //! `--volume`: probes for what moves through the scene.
 
 use super::Bake;
+use super::directional::Pass;
 use crate::cli::exit::{ExitCode, Failure};
-use crate::cli::footprint::Footprint;
 use crate::cli::goal::Goal;
+use crate::cli::parse_length;
 use crate::cli::stated::StatedError;
 use crate::cli::steering::Steering;
-use crate::cli::{Context, parse_length};
 use crate::files::OutputFolder;
 use crate::volume::file::{self, About, Header};
 use crate::volume::grid::{Grid, GridError, Resolution};
 use crate::volume::{self, validity};
 use glam::DVec3;
 use luxel_scenes::Scene;
-use luxel_solver::gather::Components;
-use luxel_solver::world::World;
 
 /// Options of volumes.
 #[derive(clap::Args)]
@@ -99,31 +97,26 @@ impl VolumeOptions {
 }
 
 impl Bake {
-    /// A volume of the given light, begun with so many patches; `Ok(None)` when it was stopped before there was any.
+    /// A volume of the light that a pass is of, `include` being its name; `Ok(None)` when it was stopped before there was any.
     pub(super) fn volume(
         &self,
-        world: &World<'_>,
+        pass: &Pass<'_, '_, '_>,
         grid: Grid,
-        light: (&str, Components, usize),
-        held: &Footprint,
-        goal: &Goal,
-        context: &Context<'_>,
+        include: &str,
     ) -> Result<Option<BakedVolume>, Failure> {
         match self.volume.order() {
-            1 => self.volume_of::<4>(world, grid, light, held, goal, context),
-            _ => self.volume_of::<9>(world, grid, light, held, goal, context),
+            1 => self.volume_of::<4>(pass, grid, include),
+            _ => self.volume_of::<9>(pass, grid, include),
         }
     }
 
     fn volume_of<const N: usize>(
         &self,
-        world: &World<'_>,
+        pass: &Pass<'_, '_, '_>,
         grid: Grid,
-        (include, components, patches): (&str, Components, usize),
-        held: &Footprint,
-        goal: &Goal,
-        context: &Context<'_>,
+        include: &str,
     ) -> Result<Option<BakedVolume>, Failure> {
+        let (world, context) = (pass.world, pass.context);
         let scene = world.scene();
         let is_valid = validity::valid(world, &grid, self.backface_tolerance);
         if !is_valid.contains(&true) {
@@ -136,9 +129,8 @@ impl Bake {
                 ),
             ));
         }
-        let aim = self.aim(world, patches, components, held, goal, context);
-        let mut steering = Steering::new(context, Some(goal));
-        let found = volume::bake::<N>(world, grid, is_valid, &aim, &mut steering)?;
+        let mut steering = Steering::new(context, Some(pass.goal));
+        let found = volume::bake::<N>(world, grid, is_valid, &pass.aim(), &mut steering)?;
         Ok(found.map(|volume| {
             context.reporter.detail(format_args!(
                 "volume: {} gather and {} shadow rays a probe",
