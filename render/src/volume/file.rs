@@ -74,7 +74,7 @@ pub struct Placement {
 pub struct Coefficients {
     /// The equation.
     pub definition: String,
-    /// Unit of a coefficient; that of E(n) is W/m2 or lx.
+    /// Unit of a coefficient, and of E(n).
     pub unit: String,
     /// Always linear.
     pub colour_space: String,
@@ -180,8 +180,8 @@ pub fn header<const N: usize>(volume: &Volume<N>, about: &About<'_>) -> Header {
         coefficients: Coefficients {
             definition: "c[k] = integral over all directions w of L(w) basis[k](w); L is the radiance that arrives from w".into(),
             unit: match about.units {
-                UnitSystem::Radiometric => "W/(m2 sr) times sr".into(),
-                UnitSystem::Photometric => "cd/m2 times sr".into(),
+                UnitSystem::Radiometric => "W m^-2 sr^-1/2; of E(n) W/m2".into(),
+                UnitSystem::Photometric => "lm m^-2 sr^-1/2; of E(n) lx".into(),
             },
             colour_space: "linear Rec. 709".into(),
             basis: BASIS[..N].iter().map(|&text| text.into()).collect(),

@@ -57,6 +57,13 @@ try {
   // A difference of two normals holds twice the error of degree one, √3 of it along an axis; and the probe's own.
   if (rms(odd) > 2 * Math.sqrt(3) * stated + 0.02) throw new Error('opposite normals disagree');
   if (rms(whole) > header.error.truncation + stated + 0.01) throw new Error('irradiance disagrees');
+  // What light() puts into shaders finds its places there.
+  const object = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshStandardMaterial());
+  volume.light(object)(new THREE.Vector3());
+  const shader = { uniforms: {}, fragmentShader: THREE.ShaderLib.physical.fragmentShader };
+  object.material.onBeforeCompile(shader);
+  const places = shader.fragmentShader.split('luxelProbe').length - 1;
+  if (places !== 2 || shader.uniforms.luxelProbe.value.length !== 9) throw new Error('the shader of three.js has changed');
 } finally {
   rmSync(folder, { recursive: true, force: true });
 }
