@@ -31,3 +31,4 @@ pub mod serve;
 pub mod solution;
 pub mod tone_map;
 pub mod view;
+pub mod volume;

@@ -12,6 +12,7 @@ pub mod bake;
 pub mod cut;
 pub mod denoise;
 pub mod dilation;
+pub mod directional;
 pub mod encoding;
 pub mod export;
 pub mod fit;

@@ -40,4 +40,6 @@ pub mod gather;
 
 pub mod adaptive;
 
+pub mod incident;
+
 pub mod audit;

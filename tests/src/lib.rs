@@ -25,3 +25,4 @@ pub mod probe;
 pub mod references;
 pub mod scene_files;
 pub mod special;
+pub mod volumes;

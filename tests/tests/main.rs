@@ -6,6 +6,7 @@ mod bad_input;
 mod cie171;
 mod delivery;
 mod determinism;
+mod directional;
 mod enclosures;
 mod extremes;
 mod form_factors;

@@ -1,6 +1,7 @@
 //! `luxel bake`: lightmaps.
 
 pub(super) mod deliver;
+mod directional;
 mod footprint;
 mod gathered;
 mod include;
@@ -8,6 +9,7 @@ mod mask_files;
 mod masks;
 mod options;
 mod places;
+mod volume;
 
 use super::checkpoint::{AtLuxels, Keeper, Options, Resume};
 use super::exit::{ExitCode, Failure};
@@ -20,6 +22,7 @@ use super::probe::Method;
 use super::reflections::Reflections;
 use super::scene;
 use super::stated::StatedError;
+use super::steering::first_error;
 use super::{Context, Session};
 use crate::files::OutputFolder;
 use crate::lightmap::atlas::Atlas;
@@ -32,6 +35,7 @@ use crate::lightmap::target::Target;
 use crate::lightmap::walls;
 use clap::ValueEnum;
 use deliver::Delivery;
+use directional::{Directional, DirectionalMaps, Pass};
 use include::Include;
 use luxel_scenes::Scene;
 use luxel_solver::direct::{Lights, NamedLight};
@@ -42,6 +46,7 @@ use places::Charts;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Duration;
+use volume::{BakedVolume, VolumeOptions};
 
 /// Bake the light of a scene into textures
 ///
@@ -127,6 +132,14 @@ pub(super) struct Bake {
     /// What smooths the noise that is left; the maps of luxels stay as they were gathered
     #[arg(long, value_enum, default_value = "builtin", value_name = "HOW")]
     denoise: Denoise,
+
+    /// Maps of where the light comes from, beside those of the light: for normal maps
+    #[arg(long, value_enum, default_value = "none", value_name = "HOW")]
+    directional: Directional,
+
+    #[command(flatten)]
+    #[serde(flatten)]
+    volume: VolumeOptions,
 }
 
 /// What smooths noise.
@@ -164,6 +177,7 @@ struct Baked {
     luxels: Luxels,
     layers: Vec<Layer>,
     masks: Vec<Masked>,
+    volume: Option<BakedVolume>,
     /// What was gathered is delivered: only a second wish to stop ends that.
     _listening: Listening,
 }
@@ -172,6 +186,8 @@ struct Baked {
 struct Layer {
     include: Include,
     maps: Finished,
+    /// Where its light comes from.
+    directional: Option<DirectionalMaps>,
     /// The error of luxels by its parts, and what bilinear filtering adds.
     stated: StatedError,
     error: manifest::Error,
@@ -180,19 +196,43 @@ struct Layer {
     patches: usize,
 }
 
+/// How wrong something is that was baked.
+struct Stated {
+    what: String,
+    error: StatedError,
+    /// What bilinear filtering leaves between texels.
+    filtering: Option<f64>,
+}
+
 impl Baked {
-    /// Every set of maps by name, how wrong its luxels are, and what filtering leaves. Of masks the noisiest speaks for all.
-    fn stated(&self) -> Vec<(String, StatedError, f64)> {
-        let layers = self.layers.iter().map(|layer| {
+    /// How wrong everything is. Of masks the noisiest speaks for all.
+    fn stated(&self) -> Vec<Stated> {
+        let layers = self.layers.iter().flat_map(|layer| {
             let name = super::name(&layer.include);
-            (name, layer.stated.clone(), layer.error.filtering)
+            let directions = layer.directional.as_ref().map(|maps| Stated {
+                what: format!("directions of {name}"),
+                error: maps.stated.clone(),
+                filtering: None,
+            });
+            let light = Stated {
+                what: name,
+                error: layer.stated.clone(),
+                filtering: Some(layer.error.filtering),
+            };
+            std::iter::once(light).chain(directions)
         });
         let noisiest = |a: &&Masked, b: &&Masked| a.stated.total().total_cmp(&b.stated.total());
-        let masks = self.masks.iter().max_by(noisiest).map(|masked| {
-            let name = super::name(&Include::Masks);
-            (name, masked.stated.clone(), masked.error.filtering)
+        let masks = self.masks.iter().max_by(noisiest).map(|masked| Stated {
+            what: super::name(&Include::Masks),
+            error: masked.stated.clone(),
+            filtering: Some(masked.error.filtering),
         });
-        layers.chain(masks).collect()
+        let volume = self.volume.as_ref().map(|volume| Stated {
+            what: "volume".into(),
+            error: volume.stated.clone(),
+            filtering: None,
+        });
+        layers.chain(masks).chain(volume).collect()
     }
 }
 
@@ -261,7 +301,7 @@ impl Bake {
         self.report(&manifest, &stated, &goal, session)?;
         let missed = stated
             .iter()
-            .map(|(_, stated, _)| stated.exit(Some(&goal)))
+            .map(|stated| stated.error.exit(Some(&goal)))
             .find(|exit| *exit != ExitCode::Ok);
         Ok(if session.context.interrupt.is_set() {
             ExitCode::Interrupted
@@ -270,21 +310,33 @@ impl Bake {
         })
     }
 
+    /// Whether any map is one of light that directions and volumes can be of.
+    fn bakes_light(&self) -> bool {
+        let mut include = self.include.iter();
+        include.any(|include| include.components().is_some())
+    }
+
     /// Tells what was delivered, and how right it is.
     fn report(
         &self,
         manifest: &Manifest,
-        stated: &[(String, StatedError, f64)],
+        stated: &[Stated],
         goal: &Goal,
         session: &mut Session<'_>,
     ) -> Result<(), Failure> {
         let context = &session.context;
         let seconds = context.started.elapsed().as_secs_f64();
-        for (name, stated, filtering) in stated {
+        for stated in stated {
+            let filtering = stated.filtering.map_or(String::new(), |filtering| {
+                format!(
+                    "; between texels filtering leaves {:.2} %",
+                    100.0 * filtering
+                )
+            });
             context.reporter.note(format_args!(
-                "{name}: {}; between texels filtering leaves {:.2} %",
-                stated.summary(Some(goal)),
-                100.0 * filtering,
+                "{}: {}{filtering}",
+                stated.what,
+                stated.error.summary(Some(goal)),
             ));
         }
         context.reporter.note(format_args!(
@@ -308,7 +360,7 @@ impl Bake {
             json["seconds"] = seconds.into();
             json["stated"] = stated
                 .iter()
-                .map(|(name, stated, _)| (name.clone(), stated.to_json(Some(goal))))
+                .map(|stated| (stated.what.clone(), stated.error.to_json(Some(goal))))
                 .collect::<serde_json::Map<_, _>>()
                 .into();
             memory::add_peak(&mut json);
@@ -369,32 +421,77 @@ impl Bake {
             ..
         } = placed;
         let listening = context.interrupt.listen();
+        let grid = self.volume.grid(world.scene())?;
+        let of_layer = 1 + usize::from(self.directional != Directional::None);
+        let passes = of_layer * self.include.len() + usize::from(grid.is_some());
         let mut layers = Vec::new();
         for &include in &self.include {
+            let done = of_layer * layers.len();
+            let of_light = &goal.part(done + 1, passes);
             let known = keeper.complete(layers.len());
             let gathered = match (known, include, include.components()) {
                 (_, Include::Masks, _) => continue,
                 (Some(complete), ..) => Some(complete),
                 (None, _, Some(components)) if self.is_traced() => {
-                    self.traced(world, &luxels, components, goal, keeper, context)
+                    self.traced(world, &luxels, components, of_light, keeper, context)
                 }
                 (None, _, Some(components)) => {
-                    self.light(world, &luxels, components, &held, goal, keeper, context)?
+                    self.light(world, &luxels, components, &held, of_light, keeper, context)?
                 }
-                (None, Include::Ao, _) => self.occlusion(world, &luxels, goal, keeper, context),
+                (None, Include::Ao, _) => self.occlusion(world, &luxels, of_light, keeper, context),
                 (None, ..) => {
                     let sky = world.lit_by(Lights::sky_of(world.scene()));
                     let components = Components::Direct;
-                    self.light(&sky, &luxels, components, &held, goal, keeper, context)?
+                    self.light(&sky, &luxels, components, &held, of_light, keeper, context)?
                 }
             };
             let Some(gathered) = gathered else {
                 return Ok(None);
             };
-            layers.push(self.layer(world, &atlas, &luxels, include, &gathered));
+            let mut layer = self.layer(world, &atlas, &luxels, include, &gathered);
+            if self.directional != Directional::None
+                && let Some(light) = include.components()
+            {
+                let pass = Pass {
+                    world,
+                    held: &held,
+                    goal: &goal.part(done + 2, passes),
+                    context,
+                    components: light,
+                    bounces: self.reflections.bounces(),
+                    patches: self.patches(&layer, goal),
+                };
+                let found = self.directions(&pass, &atlas, &luxels, &layer)?;
+                if found.is_none() {
+                    return Ok(None);
+                }
+                layer.directional = found;
+            }
+            layers.push(layer);
             let is_last = layers.len() == self.include.len();
             if !is_last && !context.interrupt.is_set() {
                 keeper.add(layers.len() - 1, gathered);
+            }
+        }
+        let mut volume = None;
+        if let Some(grid) = grid {
+            let lit = layers
+                .iter()
+                .find_map(|layer| Some((layer, layer.include.components()?)));
+            let (layer, components) = lit.expect("options were checked: some map is of light");
+            let include = super::name(&layer.include);
+            let pass = Pass {
+                world,
+                held: &held,
+                goal,
+                context,
+                components,
+                bounces: self.reflections.bounces(),
+                patches: self.patches(layer, goal),
+            };
+            volume = self.volume(&pass, grid, &include)?;
+            if volume.is_none() {
+                return Ok(None);
             }
         }
         let Some(masks) = self.masks(world, &atlas, &luxels, masked, goal, context)? else {
@@ -405,6 +502,7 @@ impl Bake {
             luxels,
             layers,
             masks,
+            volume,
             _listening: listening,
         }))
     }
@@ -431,6 +529,12 @@ impl Bake {
         }
     }
 
+    /// Patches with which more is begun about the light of a layer.
+    fn patches(&self, layer: &Layer, goal: &Goal) -> usize {
+        let first = self.first_patches(first_error(Some(goal)));
+        layer.patches.max(first)
+    }
+
     /// Makes maps of what was gathered.
     fn layer(
         &self,
@@ -445,6 +549,7 @@ impl Bake {
         Layer {
             include,
             maps,
+            directional: None,
             stated: gathered.stated.clone(),
             error: manifest::Error {
                 luxels: of_luxels,

@@ -8,8 +8,9 @@ use crate::lightmap::encoding::Format;
 use crate::lightmap::export::glb::renamed;
 use crate::lightmap::folder::{BakedFolder, FolderError};
 use crate::lightmap::handover::{Common, Handover, Of};
-use crate::lightmap::manifest::{Layer, Manifest, Masks, Page};
+use crate::lightmap::manifest::{Layer, Manifest, Page};
 use crate::lightmap::target::Target;
+use crate::volume::file as volume;
 use luxel_scenes::UnitSystem;
 use std::path::{Path, PathBuf};
 
@@ -108,7 +109,7 @@ fn require_whole(source: &BakedFolder) -> Result<(), FolderError> {
             source.require(name)?;
         }
     }
-    for name in manifest.masks.iter().flat_map(mask_files) {
+    for name in as_they_are(manifest) {
         source.require(name)?;
     }
     let files = &manifest.files;
@@ -121,10 +122,20 @@ fn require_whole(source: &BakedFolder) -> Result<(), FolderError> {
     names.into_iter().try_for_each(|name| source.require(name))
 }
 
-/// The files of a set of shadow masks.
-fn mask_files(masks: &Masks) -> impl Iterator<Item = &String> {
-    let pages = masks.pages.iter();
-    pages.flat_map(|page| [&page.file, &page.error, &page.luxels])
+/// Files that are the same for everybody: shadow masks, whose shares have no unit, directions and volumes, which are of E.
+fn as_they_are(manifest: &Manifest) -> Vec<&str> {
+    let masks = manifest.masks.iter().flat_map(|masks| &masks.pages);
+    let masks = masks.flat_map(|page| [&page.file, &page.error, &page.luxels]);
+    let layers = std::iter::once(&manifest.lightmap).chain(&manifest.others);
+    let directions = layers.filter_map(|layer| layer.directional.as_ref());
+    let directions = directions
+        .flat_map(|directional| &directional.pages)
+        .flat_map(|page| page.files.iter().chain(&page.error));
+    let mut names: Vec<&str> = masks.chain(directions).map(String::as_str).collect();
+    if let Some(header) = &manifest.volume {
+        names.extend([volume::DATA, volume::ERRORS, volume::VALIDITY, header]);
+    }
+    names
 }
 
 /// The material library of an OBJ file.
@@ -168,8 +179,7 @@ impl Exporting<'_> {
         ] {
             self.copy(name, name)?;
         }
-        // A share has no unit.
-        for name in old.masks.iter().flat_map(mask_files) {
+        for name in as_they_are(old) {
             self.copy(name, name)?;
         }
         let manifest = Manifest {

@@ -52,6 +52,16 @@ impl Goal {
         }
     }
 
+    /// The goal of the first `done` of several pieces of work that have to be finished in the same time.
+    pub(super) fn part(&self, done: usize, of: usize) -> Self {
+        let share = done as f64 / of as f64;
+        let deadline = self.deadline.map(|deadline| Deadline {
+            time: deadline.time.mul_f64(share),
+            ..deadline
+        });
+        Self { deadline, ..*self }
+    }
+
     /// Whether an estimated relative error is what was asked for. False for `NaN`, and without an
     /// error to reach.
     pub(super) fn is_met_by(&self, estimate: f64) -> bool {
@@ -145,5 +155,9 @@ mod tests {
         let both = Goal::new(Some(RelativeError(0.5)), Some(hour), started);
         assert!(both.is_met_by(0.5) && both.time_left() <= Some(hour));
         assert_eq!(Goal::new(None, None, started).time_left(), None);
+        // A third of the time for the first of three, all of it for the last, and the same error.
+        let [third, all] = [1, 3].map(|done| both.part(done, 3));
+        assert!(third.time_left() <= Some(hour / 3) && third.is_met_by(0.5));
+        assert_eq!(all.deadline, both.deadline);
     }
 }

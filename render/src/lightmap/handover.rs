@@ -94,12 +94,16 @@ impl Files {
 impl Of<'_> {
     /// The first part of the names of its files.
     pub fn stem(&self, page: usize) -> String {
-        let layer = if self.is_first {
+        format!("{}_{page:03}", self.layer())
+    }
+
+    /// What the names of the files of all its pages begin with.
+    pub fn layer(&self) -> &str {
+        if self.is_first {
             "lightmap"
         } else {
             self.include
-        };
-        format!("{layer}_{page:03}")
+        }
     }
 
     /// Whether it is light, and not openness.

@@ -47,6 +47,9 @@ pub struct Manifest {
     pub files: Files,
     /// Numbers that Bevy wants.
     pub bevy: Option<Bevy>,
+    /// Description of an irradiance volume ([`crate::volume::file`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub volume: Option<String>,
     /// Seed of all randomness.
     pub seed: u64,
 }
@@ -65,6 +68,46 @@ pub struct Layer {
     pub energy: Option<Energy>,
     /// Patches of the radiosity solution.
     pub patches: usize,
+    /// Maps of where the light comes from ([`super::directional`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub directional: Option<Directional>,
+}
+
+/// Maps of where the light of other maps comes from, with the same coordinates.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Directional {
+    /// `sh1` or `dominant`.
+    pub kind: String,
+    /// In which axes.
+    pub axes: String,
+    /// The maps, by page.
+    pub pages: Vec<DirectionalPage>,
+    /// What their texels hold.
+    pub texel: Vec<String>,
+    /// How they are read, best first: `map` is a texel of the map of light, m the mapped normal, n the surface's own.
+    pub decode: Vec<String>,
+    /// Of `sh1`: what the linear formula gives at the surface's own normal over the map.
+    pub ratio: Option<Ratio>,
+    /// Error of what is read besides that of the map, one standard deviation: root mean square over luxels and all normals, over the mean.
+    pub error: f64,
+}
+
+/// Maps of a page.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct DirectionalPage {
+    /// Of `sh1` a₀ and a along x, y and z; of `dominant` one.
+    pub files: Vec<String>,
+    /// Of `sh1`: standard error of a₀ + m·a by texel, root mean square over all m, besides that of the map.
+    pub error: Option<String>,
+}
+
+/// Over all lit texels and channels.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Ratio {
+    /// The mean: 1 where light is even, 3/4 from straight above, more at grazing incidence.
+    pub mean: f64,
+    /// How far a texel is from it, root mean square.
+    pub spread: f64,
 }
 
 /// Shadow masks of up to four lights, a channel each: from 0 (hidden, or below the horizon) to 1 (wholly seen).

@@ -74,7 +74,7 @@ pub enum Distribution {
 
 impl Distribution {
     /// Intensity in a unit direction over that of the axis.
-    fn relative(&self, direction: DVec3) -> f64 {
+    pub(crate) fn relative(&self, direction: DVec3) -> f64 {
         match *self {
             Self::Isotropic => 1.0,
             Self::Lambertian { axis } => direction.dot(axis).max(0.0),
@@ -231,7 +231,7 @@ impl Lights {
 
     /// Writes roughly how much each of [`Self::sources`] lights a point of the unit frame with the given unit
     /// normal; zero only where a source does not.
-    pub(super) fn weigh(&self, position: DVec3, normal: DVec3, weights: &mut Vec<f64>) {
+    pub(crate) fn weigh(&self, position: DVec3, normal: DVec3, weights: &mut Vec<f64>) {
         self.importance
             .weigh(&self.sources, position, normal, weights);
     }

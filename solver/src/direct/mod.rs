@@ -20,4 +20,5 @@ pub use kernel::Luminaire;
 pub use lights::{Distribution, Lights, Source};
 pub use lit::Lit;
 pub use named::{NamedKind, NamedLight};
+pub(crate) use sampler::systematic;
 pub use sampler::{DirectSampler, Sample, ShadowRays};

@@ -340,7 +340,7 @@ fn offset(sample: &Sample, set: u32) -> f64 {
 }
 
 /// Visits what lies at every `step` of the sum of weights, with step over weight: what a visit stands for.
-fn systematic(
+pub(crate) fn systematic(
     weights: impl Iterator<Item = f64>,
     step: f64,
     offset: f64,

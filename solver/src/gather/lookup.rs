@@ -22,7 +22,7 @@ use std::ops::Range;
 pub const MAX_REPLICATES: usize = 4;
 
 /// One value for each solution.
-pub(super) type PerSolution = [Rgb; MAX_REPLICATES];
+pub(crate) type PerSolution = [Rgb; MAX_REPLICATES];
 
 /// Meshes with their solutions.
 pub struct Lookup {
@@ -121,7 +121,7 @@ impl Lookup {
     }
 
     /// The positions of the solutions that count.
-    pub(super) fn range(&self, which: Solutions) -> Range<usize> {
+    pub(crate) fn range(&self, which: Solutions) -> Range<usize> {
         match which {
             Solutions::All => 0..self.solutions,
             Solutions::One(index) => index..index + 1,

@@ -28,6 +28,7 @@ pub(crate) use joined::COLUMNS as JOINED_COLUMNS;
 pub use joined::{IndirectField, joined};
 pub(crate) use lookup::orders;
 pub use lookup::{Lookup, MAX_REPLICATES, Solutions};
+pub(crate) use near_chain::{Chains, Found};
 pub(crate) use tally::SHADOW_EXPONENT;
 pub use tally::{Gathered, Tally, finish};
 
@@ -35,7 +36,6 @@ use crate::bounces::Bounces;
 use crate::direct::{DirectSampler, Dome, DomeRays, Lit, Sample, ShadowRays};
 use crate::sampling::{Sequence, Stage, hash};
 use crate::world::{Receiver, World};
-use near_chain::Chains;
 use rayon::prelude::*;
 
 /// Rays that a parallel task aims at, so that batches are long even for few rays a receiver.

@@ -60,16 +60,16 @@ struct Path {
 
 /// What the rays of a receiver found, as sums of B over them.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Found {
+pub(crate) struct Found {
     /// Light of sources that shadow rays do not reach: the sky unless it has rays of its own, emission
     /// beyond the exact sources.
-    pub(super) direct: Rgb,
+    pub(crate) direct: Rgb,
     /// Reflected light of chains: what is the same in every solution.
-    chained: Rgb,
+    pub(crate) chained: Rgb,
     /// Reflected light that was looked up, by solution.
-    looked_up: PerSolution,
+    pub(crate) looked_up: PerSolution,
     /// What was looked up less what the coarser mesh shows there, by solution.
-    difference: PerSolution,
+    pub(crate) difference: PerSolution,
     /// Squares of what each ray found altogether.
     squares: Rgb,
     /// Rays that met the back of a one-sided face.
@@ -133,7 +133,7 @@ impl Found {
 }
 
 /// Scratch space for gathering a batch of receivers.
-pub(super) struct Chains<'a> {
+pub(crate) struct Chains<'a> {
     world: &'a World<'a>,
     lookup: Option<&'a Lookup>,
     solutions: Solutions,
@@ -146,7 +146,7 @@ pub(super) struct Chains<'a> {
 }
 
 impl<'a> Chains<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         world: &'a World<'a>,
         lookup: Option<&'a Lookup>,
         solutions: Solutions,
@@ -174,10 +174,41 @@ impl<'a> Chains<'a> {
         seed: u64,
         before: u32,
         rays: u32,
-        mut add: impl FnMut(usize, Found),
+        add: impl FnMut(usize, Found),
     ) {
-        let mut found = vec![Found::default(); receivers.len()];
         self.start(receivers, keys, seed, before, rays);
+        self.follow_all(keys, seed, add);
+    }
+
+    /// Follows given rays, one for each of `keys`, of which it is the ray with the key's index. `add` is called once
+    /// a ray with its position and what it found.
+    ///
+    /// # Panics
+    /// When there is not one ray for each key.
+    pub(crate) fn follow(
+        &mut self,
+        rays: &[Ray],
+        keys: &[Key],
+        seed: u64,
+        add: impl FnMut(usize, Found),
+    ) {
+        assert_eq!(rays.len(), keys.len(), "one key for each ray");
+        self.rays.clear();
+        self.rays.extend_from_slice(rays);
+        self.paths.clear();
+        self.paths
+            .extend(keys.iter().enumerate().map(|(slot, key)| Path {
+                receiver: slot as u32,
+                ray: key.index,
+                throughput: Rgb::ONE,
+                found: Rgb::ZERO,
+            }));
+        self.follow_all(keys, seed, add);
+    }
+
+    /// Follows the rays that were started until none is left.
+    fn follow_all(&mut self, keys: &[Key], seed: u64, mut add: impl FnMut(usize, Found)) {
+        let mut found = vec![Found::default(); keys.len()];
         for link in 0.. {
             if self.paths.is_empty() {
                 break;

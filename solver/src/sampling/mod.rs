@@ -16,6 +16,7 @@ pub mod discrete;
 pub mod disk;
 pub mod frame;
 pub mod hash;
+pub mod mixed_hemisphere;
 pub mod polygon;
 pub mod projected_spherical_triangle;
 pub mod sobol;

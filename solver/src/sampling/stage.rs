@@ -44,4 +44,8 @@ impl Stage {
     pub const COMPARISON: Self = Self(20);
     /// Points on lights, from the patches that may be divided.
     pub const SUBDIVISION: Self = Self(22);
+    /// Directions and lights from points whose incident radiance is projected.
+    pub const INCIDENT: Self = Self(31);
+    /// Rays that tell whether a probe lies inside a solid.
+    pub const PROBES: Self = Self(32);
 }

@@ -36,6 +36,9 @@ fn disk_and_cosine_hemisphere_invert() {
         assert_close(widen(disk::invert(disk::sample(u))), widen(u), 5e-7);
         let w = cosine_hemisphere::sample(u);
         assert_close(widen(cosine_hemisphere::invert(w)), widen(u), 5e-7);
+        let w = mixed_hemisphere::sample(u);
+        assert!((w.length() - 1.0).abs() < 3e-7 && w.z >= 0.0, "{w}");
+        assert_close(widen(mixed_hemisphere::invert(w)), widen(u), 5e-7);
     }
 }
 

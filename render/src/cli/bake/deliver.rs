@@ -63,7 +63,12 @@ impl Delivery<'_> {
                 error: layer.error.luxels,
             };
             let pages = each_page(atlas.pages, |page| self.write_page(layer, &of, page))?;
+            let directional = match &layer.directional {
+                Some(maps) => Some(maps.write(self.folder, of.layer(), &layer.maps.map)?),
+                None => None,
+            };
             described.push(manifest::Layer {
+                directional,
                 pages,
                 include,
                 error: layer.error,
@@ -84,6 +89,14 @@ impl Delivery<'_> {
             let validity = png::encode_grey8(&raw.validity(index), atlas.size)?;
             self.folder.write(&page.validity, &validity)?;
         }
+        let volume = match &self.baked.volume {
+            Some(volume) => Some(volume.write(self.folder)?),
+            None => {
+                // That of an older bake is of another scene.
+                self.folder.remove(crate::volume::file::HEADER)?;
+                None
+            }
+        };
         let files = lightmap.pages.iter().map(|page| page.file.clone());
         let files: Vec<String> = files.collect();
         self.folder.write(
@@ -98,7 +111,8 @@ impl Delivery<'_> {
         self.folder
             .write("preview.png", &png::encode(&preview, tone_map)?)?;
         let exposure = f64::from(tone_map.exposure);
-        let manifest = self.manifest(lightmap, described.collect(), masks, exposure);
+        let mut manifest = self.manifest(lightmap, described.collect(), masks, exposure);
+        manifest.volume = volume;
         write_manifest(self.folder, self.handover, &manifest)?;
         Ok(manifest)
     }
@@ -200,6 +214,7 @@ impl Delivery<'_> {
                 preview: "preview.png".into(),
             },
             bevy: self.handover.bevy(scene.units, exposure),
+            volume: None,
             seed: self.seed,
         }
     }

@@ -1,7 +1,7 @@
 //! What a bake holds.
 
 use super::deliver::PAGES_AT_A_TIME;
-use super::{Bake, Include};
+use super::{Bake, Directional, Include};
 use crate::cli::Context;
 use crate::cli::exit::Failure;
 use crate::cli::footprint::{Footprint, larger_error, largest};
@@ -10,6 +10,7 @@ use crate::cli::steering::first_error;
 use crate::film::Film;
 use crate::image::exr::Picture;
 use crate::lightmap::atlas::Atlas;
+use crate::lightmap::directional;
 use crate::lightmap::luxels::{self, Luxel};
 use crate::lightmap::map::Lightmap;
 use crate::lightmap::masks::Mask;
@@ -48,7 +49,7 @@ impl Bake {
         context: &Context<'_>,
     ) -> Result<Footprint, Failure> {
         let page = atlas.size[0] * atlas.size[1];
-        let held = self.held(world, [atlas.texels(), page, luxels], masks);
+        let held = self.held(world, [atlas.texels(), page, luxels], masks)?;
         let with_mesh = |held: &Footprint, error: f64| {
             let patches = self.first_patches(error);
             let solving =
@@ -66,7 +67,7 @@ impl Bake {
                 let fits = |quarter: usize| {
                     let texels = (4 * quarter).pow(2);
                     let held = self.held(world, [texels; 3], masks);
-                    with_mesh(&held, error).fits(limit)
+                    held.is_ok_and(|held| with_mesh(&held, error).fits(limit))
                 };
                 let quarter = largest(4, atlas.size[0] / 4 - 1, fits)?;
                 (atlas.pages == 1).then(|| format!("--size {}", 4 * quarter))
@@ -81,7 +82,7 @@ impl Bake {
         world: &World<'_>,
         [texels, page, luxels]: [usize; 3],
         masks: usize,
-    ) -> Footprint {
+    ) -> Result<Footprint, Failure> {
         let gathers = |include: &Include| match include {
             Include::Ao => false,
             Include::Sky | Include::Masks => true,
@@ -99,15 +100,25 @@ impl Bake {
         };
         let found = luxels * (size_of::<Luxel>() + size_of::<Receiver>() + size_of::<Gathered>());
         let layers = self.include.len() - usize::from(masks > 0);
-        Footprint::of(world)
+        let directions = match self.directional {
+            Directional::None => 0,
+            Directional::Sh1 | Directional::Dominant => {
+                directional::bytes_to_gather(luxels) + directional::bytes_for(texels)
+            }
+        };
+        let grid = self.volume.grid(world.scene())?;
+        let volume = grid.map_or(0, |grid| self.volume.bytes(&grid));
+        let gathered = gathered.max(sampled).max(directions);
+        Ok(Footprint::of(world)
             .with("luxels", found.max(luxels::bytes_to_find(texels)))
-            .with("what is gathered at them", gathered.max(sampled))
+            .with("what is gathered at them", gathered)
+            .with("the irradiance volume", volume)
             .with(
                 "maps",
                 2 * layers * Lightmap::bytes_for(texels)
                     + PAGES_AT_A_TIME * Picture::bytes_for(page, 1),
             )
-            .with("masks", bytes_of_masks(texels, masks))
+            .with("masks", bytes_of_masks(texels, masks)))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Which options of a bake go together.
 
-use super::{Bake, Include};
+use super::{Bake, Directional, Include};
 use crate::cli::exit::{ExitCode, Failure};
 use crate::cli::reflections::Reflected;
 use luxel_solver::direct::NamedLight;
@@ -24,6 +24,12 @@ impl Bake {
             "masks are delivered beside a lightmap: --include direct,masks for example"
         } else if self.integrator.is_some() && components.is_empty() {
             "--integrator belongs to --include all, direct or indirect"
+        } else if !self.bakes_light() && self.directional != Directional::None {
+            "--directional belongs to --include all, direct or indirect"
+        } else if !self.bakes_light() && self.volume.resolution().is_some() {
+            "volumes hold the light of the first of the maps all, direct and indirect: --include names none of them"
+        } else if let Some(problem) = self.volume.problem() {
+            problem
         } else {
             self.reach
                 .require(self.include.contains(&Include::Ao), "--include ao")?;

@@ -78,7 +78,10 @@ mod tests {
         assert!(atlas.pages > 1);
         let [old, new] = ["exr", "ktx2"].map(|extension| {
             let names = names(atlas.pages, extension);
-            (glb(scene, origin, None, &atlas, &names).expect("written"), names)
+            (
+                glb(scene, origin, None, &atlas, &names).expect("written"),
+                names,
+            )
         });
         let found = renamed(&old.0, &new.1).expect("renamed");
         assert!(found == new.0, "byte by byte");
