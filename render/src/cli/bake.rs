@@ -8,45 +8,33 @@ mod include;
 mod mask_files;
 mod masks;
 mod options;
+mod passes;
 mod places;
+mod report;
 mod volume;
 
-use super::checkpoint::{AtLuxels, Keeper, Options, Resume};
+use super::Session;
+use super::checkpoint::{Keeper, Options, Resume};
 use super::exit::{ExitCode, Failure};
 use super::footprint::Footprint;
-use super::goal::Goal;
-use super::interrupt::Listening;
-use super::memory;
 use super::occlusion::Reach;
 use super::probe::Method;
 use super::reflections::Reflections;
 use super::scene;
-use super::stated::StatedError;
-use super::steering::first_error;
-use super::{Context, Session};
 use crate::files::OutputFolder;
-use crate::lightmap::atlas::Atlas;
-use crate::lightmap::bake::{self, Finished, Luxels, Smoothing};
-use crate::lightmap::cut::{self, CutScene};
 use crate::lightmap::encoding::Format;
 use crate::lightmap::handover::Handover;
-use crate::lightmap::manifest::{self, Manifest};
 use crate::lightmap::target::Target;
-use crate::lightmap::walls;
 use clap::ValueEnum;
 use deliver::Delivery;
-use directional::{Directional, DirectionalMaps, Pass};
+use directional::Directional;
 use include::Include;
-use luxel_scenes::Scene;
-use luxel_solver::direct::{Lights, NamedLight};
-use luxel_solver::gather::Components;
 use luxel_solver::world::World;
-use masks::Masked;
-use places::Charts;
+use passes::{Baked, Layer};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Duration;
-use volume::{BakedVolume, VolumeOptions};
+use volume::VolumeOptions;
 
 /// Bake the light of a scene into textures
 ///
@@ -152,90 +140,6 @@ enum Denoise {
     Builtin,
 }
 
-/// Where a scene is to be lit.
-struct Placed {
-    atlas: Atlas,
-    charts: Charts,
-    luxels: Luxels,
-    held: Footprint,
-}
-
-impl Placed {
-    /// The scene with faces cut at thin walls; `None` where there is nothing to cut.
-    fn cut(&self, world: &World<'_>) -> Option<CutScene> {
-        if self.charts == Charts::Given {
-            return None;
-        }
-        let planes = walls::cuts(world, &self.atlas, &self.luxels);
-        (!planes.is_empty()).then(|| cut::cut(world.scene(), &planes))
-    }
-}
-
-/// A finished bake.
-struct Baked {
-    atlas: Atlas,
-    luxels: Luxels,
-    layers: Vec<Layer>,
-    masks: Vec<Masked>,
-    volume: Option<BakedVolume>,
-    /// What was gathered is delivered: only a second wish to stop ends that.
-    _listening: Listening,
-}
-
-/// One set of maps.
-struct Layer {
-    include: Include,
-    maps: Finished,
-    /// Where its light comes from.
-    directional: Option<DirectionalMaps>,
-    /// The error of luxels by its parts, and what bilinear filtering adds.
-    stated: StatedError,
-    error: manifest::Error,
-    /// Of light: where the flux goes, and patches of the solution.
-    energy: Option<manifest::Energy>,
-    patches: usize,
-}
-
-/// How wrong something is that was baked.
-struct Stated {
-    what: String,
-    error: StatedError,
-    /// What bilinear filtering leaves between texels.
-    filtering: Option<f64>,
-}
-
-impl Baked {
-    /// How wrong everything is. Of masks the noisiest speaks for all.
-    fn stated(&self) -> Vec<Stated> {
-        let layers = self.layers.iter().flat_map(|layer| {
-            let name = super::name(&layer.include);
-            let directions = layer.directional.as_ref().map(|maps| Stated {
-                what: format!("directions of {name}"),
-                error: maps.stated.clone(),
-                filtering: None,
-            });
-            let light = Stated {
-                what: name,
-                error: layer.stated.clone(),
-                filtering: Some(layer.error.filtering),
-            };
-            std::iter::once(light).chain(directions)
-        });
-        let noisiest = |a: &&Masked, b: &&Masked| a.stated.total().total_cmp(&b.stated.total());
-        let masks = self.masks.iter().max_by(noisiest).map(|masked| Stated {
-            what: super::name(&Include::Masks),
-            error: masked.stated.clone(),
-            filtering: Some(masked.error.filtering),
-        });
-        let volume = self.volume.as_ref().map(|volume| Stated {
-            what: "volume".into(),
-            error: volume.stated.clone(),
-            filtering: None,
-        });
-        layers.chain(masks).chain(volume).collect()
-    }
-}
-
 impl Bake {
     pub(super) fn run(self, session: &mut Session<'_>) -> Result<ExitCode, Failure> {
         self.check_options()?;
@@ -308,268 +212,5 @@ impl Bake {
         } else {
             missed.unwrap_or(ExitCode::Ok)
         })
-    }
-
-    /// Whether any map is one of light that directions and volumes can be of.
-    fn bakes_light(&self) -> bool {
-        let mut include = self.include.iter();
-        include.any(|include| include.components().is_some())
-    }
-
-    /// Tells what was delivered, and how right it is.
-    fn report(
-        &self,
-        manifest: &Manifest,
-        stated: &[Stated],
-        goal: &Goal,
-        session: &mut Session<'_>,
-    ) -> Result<(), Failure> {
-        let context = &session.context;
-        let seconds = context.started.elapsed().as_secs_f64();
-        for stated in stated {
-            let filtering = stated.filtering.map_or(String::new(), |filtering| {
-                format!(
-                    "; between texels filtering leaves {:.2} %",
-                    100.0 * filtering
-                )
-            });
-            context.reporter.note(format_args!(
-                "{}: {}{filtering}",
-                stated.what,
-                stated.error.summary(Some(goal)),
-            ));
-        }
-        context.reporter.note(format_args!(
-            "{} luxels on {} page(s) of {} × {}, {:.1} texels a metre, {seconds:.2} s{}",
-            manifest.atlas.lit,
-            manifest.lightmap.pages.len(),
-            manifest.atlas.width,
-            manifest.atlas.height,
-            manifest.atlas.texels_per_metre,
-            memory::peak_in_words(),
-        ));
-        deliver::tell_losses(manifest, &context.reporter);
-        for object in &manifest.objects {
-            context.reporter.detail(format_args!(
-                "{}: {:.3} m², {:.1} texels a metre",
-                object.name, object.area, object.texels_per_metre
-            ));
-        }
-        let text = if context.common.json {
-            let mut json = serde_json::to_value(manifest)?;
-            json["seconds"] = seconds.into();
-            json["stated"] = stated
-                .iter()
-                .map(|stated| (stated.what.clone(), stated.error.to_json(Some(goal))))
-                .collect::<serde_json::Map<_, _>>()
-                .into();
-            memory::add_peak(&mut json);
-            serde_json::to_string_pretty(&json)?
-        } else {
-            self.output.join("manifest.json").display().to_string()
-        };
-        session.print(&text)
-    }
-
-    /// Finds the places and luxels of a scene, whose faces are to be parted at edges for which `cuts` is true.
-    fn place(
-        &self,
-        world: &World<'_>,
-        cuts: &[bool],
-        masked: usize,
-        goal: &Goal,
-        context: &Context<'_>,
-    ) -> Result<Placed, Failure> {
-        let (atlas, charts) = self.places(world, cuts, context)?;
-        // At least the texels that faces cover: what does not fit then is refused before luxels are looked for.
-        let covered: f64 = atlas.object_texels(world.scene()).iter().sum();
-        self.require_memory(world, &atlas, covered as usize, masked, goal, context)?;
-        let luxels = Luxels::new(world, &atlas, self.backface_tolerance);
-        let count = luxels.lit.luxels.len();
-        let held = self.require_memory(world, &atlas, count, masked, goal, context)?;
-        if luxels.lit.luxels.is_empty() {
-            return Err(Failure::new(
-                ExitCode::NothingToDo,
-                format!(
-                    "{}: all luxels lie inside solids; check which way faces look (luxel check)",
-                    world.scene().name
-                ),
-            ));
-        }
-        Ok(Placed {
-            atlas,
-            charts,
-            luxels,
-            held,
-        })
-    }
-
-    /// Bakes a scene; `None` when it was stopped before all maps were had.
-    fn bake<'r>(
-        &self,
-        world: &World<'_>,
-        placed: Placed,
-        masked: Vec<NamedLight>,
-        goal: &Goal,
-        keeper: &Keeper<'_, 'r>,
-        context: &Context<'r>,
-    ) -> Result<Option<Baked>, Failure> {
-        let Placed {
-            atlas,
-            luxels,
-            held,
-            ..
-        } = placed;
-        let listening = context.interrupt.listen();
-        let grid = self.volume.grid(world.scene())?;
-        let of_layer = 1 + usize::from(self.directional != Directional::None);
-        let passes = of_layer * self.include.len() + usize::from(grid.is_some());
-        let mut layers = Vec::new();
-        for &include in &self.include {
-            let done = of_layer * layers.len();
-            let of_light = &goal.part(done + 1, passes);
-            let known = keeper.complete(layers.len());
-            let gathered = match (known, include, include.components()) {
-                (_, Include::Masks, _) => continue,
-                (Some(complete), ..) => Some(complete),
-                (None, _, Some(components)) if self.is_traced() => {
-                    self.traced(world, &luxels, components, of_light, keeper, context)
-                }
-                (None, _, Some(components)) => {
-                    self.light(world, &luxels, components, &held, of_light, keeper, context)?
-                }
-                (None, Include::Ao, _) => self.occlusion(world, &luxels, of_light, keeper, context),
-                (None, ..) => {
-                    let sky = world.lit_by(Lights::sky_of(world.scene()));
-                    let components = Components::Direct;
-                    self.light(&sky, &luxels, components, &held, of_light, keeper, context)?
-                }
-            };
-            let Some(gathered) = gathered else {
-                return Ok(None);
-            };
-            let mut layer = self.layer(world, &atlas, &luxels, include, &gathered);
-            if self.directional != Directional::None
-                && let Some(light) = include.components()
-            {
-                let pass = Pass {
-                    world,
-                    held: &held,
-                    goal: &goal.part(done + 2, passes),
-                    context,
-                    components: light,
-                    bounces: self.reflections.bounces(),
-                    patches: self.patches(&layer, goal),
-                };
-                let found = self.directions(&pass, &atlas, &luxels, &layer)?;
-                if found.is_none() {
-                    return Ok(None);
-                }
-                layer.directional = found;
-            }
-            layers.push(layer);
-            let is_last = layers.len() == self.include.len();
-            if !is_last && !context.interrupt.is_set() {
-                keeper.add(layers.len() - 1, gathered);
-            }
-        }
-        let mut volume = None;
-        if let Some(grid) = grid {
-            let lit = layers
-                .iter()
-                .find_map(|layer| Some((layer, layer.include.components()?)));
-            let (layer, components) = lit.expect("options were checked: some map is of light");
-            let include = super::name(&layer.include);
-            let pass = Pass {
-                world,
-                held: &held,
-                goal,
-                context,
-                components,
-                bounces: self.reflections.bounces(),
-                patches: self.patches(layer, goal),
-            };
-            volume = self.volume(&pass, grid, &include)?;
-            if volume.is_none() {
-                return Ok(None);
-            }
-        }
-        let Some(masks) = self.masks(world, &atlas, &luxels, masked, goal, context)? else {
-            return Ok(None);
-        };
-        Ok(Some(Baked {
-            atlas,
-            luxels,
-            layers,
-            masks,
-            volume,
-            _listening: listening,
-        }))
-    }
-
-    /// The lights whose masks are asked for.
-    fn masked(&self, world: &World<'_>) -> Vec<NamedLight> {
-        if self.include.contains(&Include::Masks) {
-            world.lights().named(world.scene())
-        } else {
-            Vec::new()
-        }
-    }
-
-    /// Whether light is computed by paths.
-    fn is_traced(&self) -> bool {
-        self.integrator == Some(Method::Path)
-    }
-
-    /// What is done about noise.
-    fn smoothing(&self) -> Smoothing {
-        match self.denoise {
-            Denoise::None => Smoothing::None,
-            Denoise::Builtin => Smoothing::NonLocalMeans,
-        }
-    }
-
-    /// Patches with which more is begun about the light of a layer.
-    fn patches(&self, layer: &Layer, goal: &Goal) -> usize {
-        let first = self.first_patches(first_error(Some(goal)));
-        layer.patches.max(first)
-    }
-
-    /// Makes maps of what was gathered.
-    fn layer(
-        &self,
-        world: &World<'_>,
-        atlas: &Atlas,
-        luxels: &Luxels,
-        include: Include,
-        gathered: &AtLuxels,
-    ) -> Layer {
-        let maps = bake::finish(world, atlas, luxels, &gathered.values, self.smoothing());
-        let [of_luxels, total] = [&maps.raw, &maps.map].map(bake::relative_error);
-        Layer {
-            include,
-            maps,
-            directional: None,
-            stated: gathered.stated.clone(),
-            error: manifest::Error {
-                luxels: of_luxels,
-                filtering: (total * total - of_luxels * of_luxels).max(0.0).sqrt(),
-                total,
-            },
-            energy: gathered.energy,
-            patches: gathered.patches,
-        }
-    }
-}
-
-/// Texels a metre, the root mean square over all surfaces that have texels.
-fn texels_per_metre(atlas: &Atlas, scene: &Scene) -> f64 {
-    let texels: f64 = atlas.object_texels(scene).iter().sum();
-    let charted = scene.face_ids().filter(|face| atlas.chart(*face).is_some());
-    let area: f64 = charted.map(|face| scene.area(face)).sum();
-    if area > 0.0 {
-        (texels / area).sqrt()
-    } else {
-        0.0
     }
 }

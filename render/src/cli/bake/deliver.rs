@@ -1,6 +1,6 @@
 //! Writes the folder of a bake, each file whole or not at all and the manifest last: a folder with a manifest is complete.
 
-use super::{Baked, Layer, mask_files, texels_per_metre};
+use super::{Baked, Layer, mask_files};
 use crate::camera::CameraFrame;
 use crate::cli::exit::Failure;
 use crate::cli::reporter::Reporter;
@@ -8,6 +8,7 @@ use crate::files::OutputFolder;
 use crate::image::exr::{self, Picture};
 use crate::image::{Image, png};
 use crate::integrators::{Samples, expose};
+use crate::lightmap::atlas::Atlas;
 use crate::lightmap::bake::Finished;
 use crate::lightmap::cut::Weights;
 use crate::lightmap::export::glb::glb;
@@ -308,5 +309,17 @@ fn overview(scene: &Scene) -> Camera {
             fov: FieldOfView::Horizontal(1.3),
         },
         size: PREVIEW_SIZE,
+    }
+}
+
+/// Texels a metre, the root mean square over all surfaces that have texels.
+fn texels_per_metre(atlas: &Atlas, scene: &Scene) -> f64 {
+    let texels: f64 = atlas.object_texels(scene).iter().sum();
+    let charted = scene.face_ids().filter(|face| atlas.chart(*face).is_some());
+    let area: f64 = charted.map(|face| scene.area(face)).sum();
+    if area > 0.0 {
+        (texels / area).sqrt()
+    } else {
+        0.0
     }
 }

@@ -8,6 +8,12 @@ use luxel_solver::gather::Components;
 use luxel_solver::world::World;
 
 impl Bake {
+    /// Whether any map is one of light that directions and volumes can be of.
+    fn bakes_light(&self) -> bool {
+        let mut include = self.include.iter();
+        include.any(|include| include.components().is_some())
+    }
+
     /// Refuses options that would have no effect.
     pub(super) fn check_options(&self) -> Result<(), Failure> {
         let mut kinds = self.include.clone();
