@@ -167,7 +167,7 @@ fn a_wall_hides_its_share_of_the_sky() {
     push_sky(&mut scene);
     let places = Places::new(&scene, 32);
     let sky = places.world.lit_by(Lights::sky_of(&scene));
-    let found = gathered(
+    let (found, stated) = gathered(
         &sky,
         &places.luxels,
         Components::Direct,
@@ -182,8 +182,18 @@ fn a_wall_hides_its_share_of_the_sky() {
     let expected: Vec<f64> = places.points().iter().map(exact).collect();
     assert!(found.len() > 700, "{} luxels", found.len());
     let known_to = PI * (4.0 / FAR).powi(2);
-    let ratio = agree(&found, &expected, known_to).expect("the sky above a wall");
-    assert!((0.5..=1.5).contains(&ratio), "{ratio}");
+    agree(&found, &expected, known_to).expect("the sky above a wall");
+    let count = found.len() as f64;
+    let differences = found
+        .iter()
+        .zip(&expected)
+        .map(|(g, e)| g.irradiance().0.x - e);
+    let rms = (differences.map(|d| d * d).sum::<f64>() / count).sqrt();
+    let made = rms / (expected.iter().sum::<f64>() / count);
+    println!("sky: {made} is made, {stated} stated");
+    // The square of the error is known to a few percent from 900 luxels; their noise has long tails, where the wall cuts the corner of a
+    // square of directions that one ray stands for.
+    assert!((0.7..=1.4).contains(&(made / stated)), "{made} of {stated}");
 }
 
 /// A rectangular lamp half hidden by a straight edge: a point sees the part of the lamp beyond the plane through itself and the edge, and
@@ -210,7 +220,7 @@ fn masks_have_the_penumbra_of_a_straight_edge() {
     let lit = places
         .world
         .lit_by(places.world.lights().only(&named[0].sources));
-    let light = gathered(
+    let (light, _) = gathered(
         &lit,
         &places.luxels,
         Components::Direct,
@@ -245,7 +255,7 @@ fn masks_have_the_penumbra_of_a_straight_edge() {
     for (found, expected) in found.iter().zip(&expected) {
         if *expected == 0.0 {
             assert!(found.direct.0.x == 0.0, "{found:?}");
-        } else if *expected == 1.0 {
+        } else if *expected >= 1.0 {
             assert!((found.direct.0.x - 1.0).abs() < 1e-12, "{found:?}");
         }
     }
@@ -303,7 +313,7 @@ fn masks_add_up_to_direct_light() {
     let scene = many_lights();
     let places = Places::new(&scene, 64);
     let receivers = &places.luxels.lit.receivers;
-    let direct = gathered(
+    let (direct, _) = gathered(
         &places.world,
         &places.luxels,
         Components::Direct,
@@ -319,7 +329,7 @@ fn masks_add_up_to_direct_light() {
             .world
             .lit_by(places.world.lights().only(&light.sources));
         let whole = unoccluded(&lit, receivers);
-        let of_light = gathered(
+        let (of_light, _) = gathered(
             &lit,
             &places.luxels,
             Components::Direct,
@@ -428,7 +438,7 @@ fn masks_are_delivered_four_lights_a_picture() {
             let values = exr::read_channel(&one.join(&page.file), channel).expect("a channel");
             assert!(values.iter().all(|v| (0.0..=1.0).contains(v)));
             let Some(light) = light else {
-                assert!(values.iter().all(|v| *v == 1.0), "nothing is hidden");
+                assert!(values.iter().all(|v| *v >= 1.0), "nothing is hidden");
                 continue;
             };
             let errors = exr::read_channel(&one.join(&page.luxels), &format!("error.{channel}"));
@@ -590,7 +600,7 @@ fn paths_bake_what_the_gather_bakes() {
     push_sky(&mut scene);
     let places = Places::new(&scene, 32);
     let receivers = &places.luxels.lit.receivers;
-    let by_gather = gathered(
+    let (by_gather, _) = gathered(
         &places.world,
         &places.luxels,
         Components::All,

@@ -97,22 +97,17 @@ impl Bake {
             Film::bytes_to_refine(luxels)
         };
         let found = luxels * (size_of::<Luxel>() + size_of::<Receiver>() + size_of::<Gathered>());
+        let maps = 2 * Lightmap::bytes_for(texels);
         let layers = self.include.len() - usize::from(masks > 0);
+        // While the last is gathered all others are there; masks come after maps.
+        let others = if masks > 0 { layers } else { layers - 1 };
+        let last = gathered
+            .max(sampled)
+            .max(maps + 2 * Picture::bytes_for(page, 1));
         Footprint::of(world)
             .with("luxels", found.max(luxels::bytes_to_find(texels)))
-            .with("what is gathered at them", gathered.max(sampled))
-            .with(
-                "maps",
-                2 * layers * Lightmap::bytes_for(texels) + 2 * Picture::bytes_for(page, 1),
-            )
-            .with("masks", bytes_of_masks(texels, masks))
+            .with("what is gathered at them, or maps of it", last)
+            .with("other maps", others * maps)
+            .with("masks", Mask::bytes_for(texels, masks))
     }
-}
-
-/// Masks of so many lights, and the maps that the last of them is made from.
-fn bytes_of_masks(texels: usize, lights: usize) -> usize {
-    if lights == 0 {
-        return 0;
-    }
-    Mask::bytes_for(texels, lights) + 2 * Lightmap::bytes_for(texels)
 }
