@@ -180,15 +180,11 @@ fn bakes_hold_what_is_expected() {
         let words: Vec<&str> = options.split(' ').collect();
         is_expected(&[&["bake", scene, "-o", out], &words[..]].concat());
     };
-    bake(&cornell, "--size 512 --error 10%");
-    bake(&cornell, "--size 512 --error 30% --include direct,masks");
-    bake(&cornell, "--size 512 --include ao,direct --error 20%");
-    bake(&cornell, "--size 256 --error 4% --bounces 6");
+    bake(&cornell, "--size 256 --error 15%");
+    bake(&cornell, "--size 256 --error 30% --include direct,masks,ao");
+    bake(&cornell, "--size 256 --error 10% --bounces 6");
     bake(&cornell, "--size 256 --error 90% --integrator path");
-    bake(
-        &pavilion,
-        "--size 256 --error 20% --include all,direct,indirect",
-    );
+    bake(&pavilion, "--size 256 --error 30% --include all,direct");
 }
 
 /// Asserts that a run is refused for want of memory, and that what its message says would fit does.
@@ -227,8 +223,8 @@ fn what_is_suggested_fits() {
     let dense = "solve --form-factors raycast --rays 64";
     refused(&format!("{dense} --patch-size 0.01"), "24M", "--patch-size");
     refused(dense, "24M", "--patch-size");
-    let bake = "bake -o OUT --error 20% --size 1024";
-    refused(bake, "300M", "--size");
+    let bake = "bake -o OUT.maps --error 30% --include ao,direct --size 512";
+    refused(bake, "150M", "--size");
     let ao = "render -o OUT --integrator ao --spp 1 --size 1000x300";
     refused(ao, "24M", "--size");
 }

@@ -55,7 +55,7 @@ pub fn atlas(scene: &Scene, side: usize) -> Atlas {
         .expect("an atlas")
 }
 
-/// What is gathered at luxels in the light of `world`, to a relative error.
+/// What is gathered at luxels in the light of `world`, to a relative error, and the error that is stated for all of it.
 ///
 /// # Panics
 /// When the scene cannot be meshed.
@@ -66,7 +66,7 @@ pub fn gathered(
     bounces: Bounces,
     error: f64,
     seed: u64,
-) -> Vec<Gathered> {
+) -> (Vec<Gathered>, f64) {
     let config = AdaptiveConfig {
         error,
         components,
@@ -75,7 +75,8 @@ pub fn gathered(
         seed,
     };
     let found = bake(world, luxels, &config, None, &mut Until(error)).expect("a mesh");
-    found.expect("nobody stops it").gathered
+    let found = found.expect("nobody stops it");
+    (found.gathered, found.adaptive.parts.total())
 }
 
 /// Bakes a scene on one page of `side` texels to a relative error, smoothed.
@@ -86,7 +87,7 @@ pub fn baked(scene: &Scene, side: usize, error: f64) -> Baked<'_> {
     let world = World::new(scene);
     let atlas = atlas(scene, side);
     let luxels = Luxels::new(&world, &atlas, 0.5);
-    let gathered = gathered(&world, &luxels, Components::All, Bounces::All, error, 0);
+    let (gathered, _) = gathered(&world, &luxels, Components::All, Bounces::All, error, 0);
     let maps = finish(&world, &atlas, &luxels, &gathered, Smoothing::NonLocalMeans);
     Baked {
         world,

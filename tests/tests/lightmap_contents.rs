@@ -19,7 +19,7 @@ use luxel_solver::gather::{Components, Gathered, MAX_REPLICATES};
 use luxel_solver::world::World;
 use luxel_tests::builder::{Part, Polygon, flipped, parallelogram, room, scene, solid_box};
 use luxel_tests::command::{arg, luxel};
-use luxel_tests::hypothesis::{Comparison, z_test};
+use luxel_tests::hypothesis::{Comparison, t_test, z_test};
 use luxel_tests::lightmaps::{atlas, gathered};
 use luxel_tests::picture::{example, render};
 use luxel_tests::probe::Probe;
@@ -76,36 +76,30 @@ impl<'s> Places<'s> {
     }
 }
 
-/// Compares means of groups of consecutive luxels, whose noise is their own and evens out, with what is expected of
-/// them; and the errors of single luxels with those that are stated, root mean square.
-fn agree(found: &[Gathered], expected: &[f64], group: usize, known_to: f64) -> Result<f64, String> {
-    let pairs: Vec<(f64, f64, f64)> = found
+/// Bands of luxels, by what is expected of them, each of which must have the right mean.
+const BANDS: usize = 4;
+
+/// Tests that values at luxels have no bias beyond `known_to`, from the dark to the bright, and returns their errors over those that
+/// are stated, root mean square. How far single luxels are off is known by what all of them tell; their own few replicates say
+/// little, so that the tests are of the scatter that there is and not of the stated one.
+fn agree(found: &[Gathered], expected: &[f64], known_to: f64) -> Result<f64, String> {
+    let mut pairs: Vec<(f64, f64, f64)> = found
         .iter()
         .zip(expected)
         .map(|(g, &e)| (g.irradiance().0.x, g.standard_error().0.x, e))
+        .filter(|(_, error, _)| *error > 0.0)
         .collect();
-    let comparisons: Vec<Comparison> = pairs
-        .chunks_exact(group)
-        .map(|group| {
-            let count = group.len() as f64;
-            let mean = |of: fn(&(f64, f64, f64)) -> f64| group.iter().map(of).sum::<f64>() / count;
-            let square = mean(|(_, error, _)| error * error) / count;
-            let expected = mean(|(.., expected)| *expected);
-            let value = mean(|(value, ..)| *value);
-            Comparison {
-                value,
-                standard_error: square.sqrt(),
-                expected: value.clamp(expected - known_to, expected + known_to),
-            }
-        })
-        .collect();
-    let noisy = pairs.iter().filter(|(_, error, _)| *error > 0.0);
-    let z = |(value, error, expected): &(f64, f64, f64)| (value - expected) / error;
-    let squares: f64 = noisy.clone().map(|pair| z(pair).powi(2)).sum();
-    let ratio = (squares / noisy.clone().count().max(1) as f64).sqrt();
-    let worst = noisy.max_by(|a, b| z(a).abs().total_cmp(&z(b).abs()));
-    println!("errors over stated ones {ratio}, worst {worst:?}");
-    z_test(&comparisons)?;
+    assert!(pairs.len() > 200, "{} luxels are uncertain", pairs.len());
+    pairs.sort_by(|a, b| a.2.total_cmp(&b.2));
+    let rms =
+        |of: &dyn Fn(&(f64, f64, f64)) -> f64| pairs.iter().map(|p| of(p).powi(2)).sum::<f64>();
+    let ratio = (rms(&|p| p.0 - p.2) / rms(&|p| p.1)).sqrt();
+    println!("{} luxels: errors over stated ones {ratio}", pairs.len());
+    for band in pairs.chunks(pairs.len().div_ceil(BANDS)) {
+        let differences: Vec<f64> = band.iter().map(|pair| pair.0 - pair.2).collect();
+        let mean = differences.iter().sum::<f64>() / differences.len() as f64;
+        t_test(&differences, mean.clamp(-known_to, known_to), BANDS)?;
+    }
     Ok(ratio)
 }
 
@@ -148,7 +142,7 @@ fn manifest(folder: &Path) -> Manifest {
 }
 
 /// A wall of height h at a distance d, of no end to both sides, leaves π L (1 + cos α)/2 of a uniform sky with tan α = h/d; the stated
-/// errors of luxels are about those that there are. The lamp in the scene does not count.
+/// errors of luxels are about those that there are. The lamp, which the wall hides, does not count.
 #[test]
 fn a_wall_hides_its_share_of_the_sky() {
     /// Half the length of the wall. What lies beyond would cover (x / FAR)² of the hemisphere at most.
@@ -159,7 +153,7 @@ fn a_wall_hides_its_share_of_the_sky() {
         DVec3::Y * HEIGHT,
         DVec3::Z * (2.0 * FAR),
     );
-    let lamp = parallelogram(v(0.0, 3.0, 0.0), DVec3::X * 0.1, DVec3::Z * 0.1);
+    let lamp = parallelogram(v(-5.0, 0.5, 0.0), DVec3::X * 0.1, DVec3::Z * 0.1);
     let mut scene = scene(
         "wall",
         [
@@ -173,7 +167,7 @@ fn a_wall_hides_its_share_of_the_sky() {
     push_sky(&mut scene);
     let places = Places::new(&scene, 32);
     let sky = places.world.lit_by(Lights::sky_of(&scene));
-    let found = gathered(
+    let (found, stated) = gathered(
         &sky,
         &places.luxels,
         Components::Direct,
@@ -188,8 +182,18 @@ fn a_wall_hides_its_share_of_the_sky() {
     let expected: Vec<f64> = places.points().iter().map(exact).collect();
     assert!(found.len() > 700, "{} luxels", found.len());
     let known_to = PI * (4.0 / FAR).powi(2);
-    let ratio = agree(&found, &expected, 32, known_to).expect("the sky above a wall");
-    assert!((0.5..=1.5).contains(&ratio), "{ratio}");
+    agree(&found, &expected, known_to).expect("the sky above a wall");
+    let count = found.len() as f64;
+    let differences = found
+        .iter()
+        .zip(&expected)
+        .map(|(g, e)| g.irradiance().0.x - e);
+    let rms = (differences.map(|d| d * d).sum::<f64>() / count).sqrt();
+    let made = rms / (expected.iter().sum::<f64>() / count);
+    println!("sky: {made} is made, {stated} stated");
+    // The square of the error is known to a few percent from 900 luxels; their noise has long tails, where the wall cuts the corner of a
+    // square of directions that one ray stands for.
+    assert!((0.7..=1.4).contains(&(made / stated)), "{made} of {stated}");
 }
 
 /// A rectangular lamp half hidden by a straight edge: a point sees the part of the lamp beyond the plane through itself and the edge, and
@@ -216,12 +220,12 @@ fn masks_have_the_penumbra_of_a_straight_edge() {
     let lit = places
         .world
         .lit_by(places.world.lights().only(&named[0].sources));
-    let light = gathered(
+    let (light, _) = gathered(
         &lit,
         &places.luxels,
         Components::Direct,
         Bounces::AtMost(0),
-        0.01,
+        0.002,
         5,
     );
     let whole = unoccluded(&lit, &places.luxels.lit.receivers);
@@ -244,14 +248,14 @@ fn masks_have_the_penumbra_of_a_straight_edge() {
     let expected: Vec<f64> = places.points().iter().map(exact).collect();
     let partial = expected.iter().filter(|e| **e > 0.0 && **e < 1.0).count();
     assert!(partial > 300, "{partial} luxels in the penumbra");
-    // With the rays that a penumbra gets the sampler's means are ratios, whose bias is below a thousandth.
-    let ratio = agree(&found, &expected, 24, 1e-3).expect("the penumbra of an edge");
+    // The sampler's means are ratios, whose bias is a tenth of the noise of these hundreds of rays at most.
+    let ratio = agree(&found, &expected, 2e-4).expect("the penumbra of an edge");
     assert!((0.5..=1.5).contains(&ratio), "{ratio}");
     // Outside of the penumbra nothing is uncertain.
     for (found, expected) in found.iter().zip(&expected) {
         if *expected == 0.0 {
             assert!(found.direct.0.x == 0.0, "{found:?}");
-        } else if *expected == 1.0 {
+        } else if *expected >= 1.0 {
             assert!((found.direct.0.x - 1.0).abs() < 1e-12, "{found:?}");
         }
     }
@@ -309,7 +313,7 @@ fn masks_add_up_to_direct_light() {
     let scene = many_lights();
     let places = Places::new(&scene, 64);
     let receivers = &places.luxels.lit.receivers;
-    let direct = gathered(
+    let (direct, _) = gathered(
         &places.world,
         &places.luxels,
         Components::Direct,
@@ -325,7 +329,7 @@ fn masks_add_up_to_direct_light() {
             .world
             .lit_by(places.world.lights().only(&light.sources));
         let whole = unoccluded(&lit, receivers);
-        let of_light = gathered(
+        let (of_light, _) = gathered(
             &lit,
             &places.luxels,
             Components::Direct,
@@ -434,7 +438,7 @@ fn masks_are_delivered_four_lights_a_picture() {
             let values = exr::read_channel(&one.join(&page.file), channel).expect("a channel");
             assert!(values.iter().all(|v| (0.0..=1.0).contains(v)));
             let Some(light) = light else {
-                assert!(values.iter().all(|v| *v == 1.0), "nothing is hidden");
+                assert!(values.iter().all(|v| *v >= 1.0), "nothing is hidden");
                 continue;
             };
             let errors = exr::read_channel(&one.join(&page.luxels), &format!("error.{channel}"));
@@ -554,29 +558,22 @@ fn gather_and_paths_agree_on_every_bounce() {
         let mut before: Option<Vec<f64>> = None;
         let mut comparisons = Vec::new();
         for bounces in ["1", "2"] {
-            let probe = |method: &str, components: &str, error: &str| {
-                let arguments = [
-                    "--integrator",
-                    method,
-                    "--bounces",
-                    bounces,
-                    "--error",
-                    error,
-                ];
+            let probe = |method: &str, rays: &str| {
+                let arguments = ["--integrator", method, "--bounces", bounces, "--rays", rays];
                 let probe = Probe {
                     scene: &open,
                     toml: lights,
                     points: points.clone(),
                     arguments: arguments
                         .iter()
-                        .chain(&["--components", components])
+                        .chain(&["--components", "indirect"])
                         .map(|s| (*s).to_owned())
                         .collect(),
                 };
                 probe.run(7)
             };
-            let by_gather = probe("gather", "indirect", "1%");
-            let by_path = probe("path", "indirect", "1%");
+            let by_gather = probe("gather", "16384");
+            let by_path = probe("path", "65536");
             for (a, b) in by_gather.iter().zip(&by_path) {
                 comparisons.push(Comparison {
                     value: a.value.x,
@@ -603,7 +600,7 @@ fn paths_bake_what_the_gather_bakes() {
     push_sky(&mut scene);
     let places = Places::new(&scene, 32);
     let receivers = &places.luxels.lit.receivers;
-    let by_gather = gathered(
+    let (by_gather, _) = gathered(
         &places.world,
         &places.luxels,
         Components::All,
@@ -632,7 +629,7 @@ fn paths_bake_what_the_gather_bakes() {
         })
         .collect();
     let expected: Vec<f64> = by_gather.iter().map(|g| g.irradiance().0.x).collect();
-    let ratio = agree(&by_path, &expected, 40, 0.005 * level).expect("the same light");
+    let ratio = agree(&by_path, &expected, 0.005 * level).expect("the same light");
     assert!((0.5..=1.5).contains(&ratio), "{ratio}");
 }
 

@@ -27,12 +27,12 @@ pub(super) enum Reflected {
 
 impl Reflections {
     /// How often.
-    pub(super) fn bounces(&self) -> Bounces {
+    pub(super) fn bounces(self) -> Bounces {
         self.bounces.map_or(Bounces::All, Bounces::AtMost)
     }
 
     /// Refuses bounces that would have no effect, and reflected light without any.
-    pub(super) fn require(&self, reflected: Reflected) -> Result<(), Failure> {
+    pub(super) fn require(self, reflected: Reflected) -> Result<(), Failure> {
         let problem = match reflected {
             Reflected::None(option) if self.bounces.is_some() => {
                 format!("--bounces belongs to {option}")

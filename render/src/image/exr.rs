@@ -399,7 +399,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("mask.exr");
         let samples = |first: f32| vec![first, 0.25, 1.0, 0.5];
-        let channels = ["R", "G", "B", "A"].map(|name| name.to_owned());
+        let channels = ["R", "G", "B", "A"].map(str::to_owned);
         let channels = channels.into_iter().zip([0.0, 0.1, 0.2, 0.3].map(samples));
         let bytes = encode_channels([2, 2], channels).expect("encodable");
         std::fs::write(&path, bytes).expect("writable");

@@ -99,33 +99,29 @@ impl Bake {
             Film::bytes_to_refine(luxels)
         };
         let found = luxels * (size_of::<Luxel>() + size_of::<Receiver>() + size_of::<Gathered>());
+        let maps = 2 * Lightmap::bytes_for(texels);
         let layers = self.include.len() - usize::from(masks > 0);
-        let directions = match self.directional {
-            Directional::None => 0,
-            Directional::Sh1 | Directional::Dominant => {
-                directional::bytes_to_gather(luxels) + directional::bytes_for(texels)
-            }
+        let [directions, of_directions] = match self.directional {
+            Directional::None => [0; 2],
+            Directional::Sh1 | Directional::Dominant => [
+                directional::bytes_to_gather(luxels),
+                directional::bytes_for(texels),
+            ],
         };
         let grid = self.volume.grid(world.scene())?;
         let volume = grid.map_or(0, |grid| self.volume.bytes(&grid));
-        let gathered = gathered.max(sampled).max(directions);
+        // While the last is gathered all others are there; masks and volumes come after maps.
+        let comes_after = masks > 0 || volume > 0;
+        let others = if comes_after { layers } else { layers - 1 };
+        let last = gathered
+            .max(sampled)
+            .max(maps + directions + of_directions)
+            .max(maps + PAGES_AT_A_TIME * Picture::bytes_for(page, 1));
         Ok(Footprint::of(world)
             .with("luxels", found.max(luxels::bytes_to_find(texels)))
-            .with("what is gathered at them", gathered)
+            .with("what is gathered at them, or maps of it", last)
+            .with("other maps", others * (maps + of_directions))
             .with("the irradiance volume", volume)
-            .with(
-                "maps",
-                2 * layers * Lightmap::bytes_for(texels)
-                    + PAGES_AT_A_TIME * Picture::bytes_for(page, 1),
-            )
-            .with("masks", bytes_of_masks(texels, masks)))
+            .with("masks", Mask::bytes_for(texels, masks)))
     }
-}
-
-/// Masks of so many lights, and the maps that the last of them is made from.
-fn bytes_of_masks(texels: usize, lights: usize) -> usize {
-    if lights == 0 {
-        return 0;
-    }
-    Mask::bytes_for(texels, lights) + 2 * Lightmap::bytes_for(texels)
 }
