@@ -54,13 +54,11 @@ impl Delivery<'_> {
             };
             let pages: Vec<Page> = (0..atlas.pages).map(|page| self.page(stem, page)).collect();
             self.write_maps(layer, &pages)?;
-            let directional = match &layer.directional {
-                Some(maps) => {
-                    let factor = self.target.quantity().factor();
-                    Some(maps.write(self.folder, stem, &layer.maps.map, factor)?)
-                }
-                None => None,
-            };
+            let factor = self.target.quantity().factor();
+            let directional = layer.directional.as_ref();
+            let directional = directional
+                .map(|maps| maps.write(self.folder, stem, &layer.maps.map, factor))
+                .transpose()?;
             described.push(manifest::Layer {
                 directional,
                 include,
@@ -82,14 +80,10 @@ impl Delivery<'_> {
             let validity = png::encode_grey8(&raw.validity(index), atlas.size)?;
             self.folder.write(&page.validity, &validity)?;
         }
-        let volume = match &self.baked.volume {
-            Some(volume) => Some(volume.write(self.folder)?),
-            None => {
-                // That of an older bake is of another scene.
-                self.folder.remove(crate::volume::file::HEADER)?;
-                None
-            }
-        };
+        // That of an older bake is of another scene.
+        self.folder.remove(crate::volume::file::HEADER)?;
+        let volume = self.baked.volume.as_ref();
+        let volume = volume.map(|volume| volume.write(self.folder)).transpose()?;
         let files = lightmap.pages.iter().map(|page| page.file.clone());
         let files: Vec<String> = files.collect();
         self.folder
