@@ -324,11 +324,14 @@ fn directions_go_with_the_map_and_state_their_error() {
             let flux = vector_irradiance(&estimate.coefficients).map(|axis| axis.x);
             DVec3::from_array(flux).dot(receiver.normal)
         });
-        // Where joined noise has no light left there is no shape either.
-        if level <= 0.0 || its_level <= 0.0 {
+        // The bottom of the block looks out of the room.
+        if level <= 0.0 {
+            let none = [Rgb::ZERO; directional::COEFFICIENTS];
+            assert_eq!([a.coefficients, b.coefficients], [none; 2]);
             dark += 1;
             continue;
         }
+        assert!(its_level > 0.0, "{level} is not {its_level}");
         for k in 0..directional::COEFFICIENTS {
             let its = b.coefficients[k].x * level / its_level;
             made += (a.coefficients[k].x - its).powi(2);
@@ -337,7 +340,7 @@ fn directions_go_with_the_map_and_state_their_error() {
     }
     let ratio = f64::sqrt(made / stated);
     println!("{ratio} of the stated error, {dark} are dark");
-    assert!(dark * 100 < found.estimates.len(), "{dark} are dark");
+    assert!(dark * 20 < found.estimates.len(), "{dark} are dark");
     // What patches leave is stated but common to both seeds, and joining has a bias that is stated and common in part.
     assert!((0.3..1.2).contains(&ratio), "{ratio}");
 }
