@@ -28,8 +28,7 @@ fn bake(scene: &Path, folder: &Path, options: &[&str]) -> luxel_tests::command::
 }
 
 /// A floor under light from one direction.
-const SUN: &str =
-    "[[light]]\nkind = \"directional\"\ndirection = [-0.6, -0.64, 0.48]\nirradiance = 2.0\n";
+const SUN: &str = "[[light]]\nkind = \"directional\"\ndirection = [-0.6, -0.64, 0.48]\nwatts_per_square_metre = 2.0\n";
 
 fn floor() -> Scene {
     let corner = DVec3::new(-1.0, 0.0, -1.0);
@@ -319,7 +318,7 @@ fn directions_go_with_the_map_and_state_their_error() {
         }
     }
     let (other, _) = directions(&baked, asked, 2);
-    let (mut made, mut stated) = (0.0, 0.0);
+    let (mut made, mut stated, mut dark) = (0.0, 0.0, 0);
     let pairs = found.estimates.iter().zip(&other.estimates);
     for ((a, b), receiver) in pairs.zip(&baked.luxels.lit.receivers) {
         // The second for the irradiance of the first: what is stated is the error of shapes.
@@ -327,7 +326,14 @@ fn directions_go_with_the_map_and_state_their_error() {
             let flux = vector_irradiance(&estimate.coefficients).map(|axis| axis.x);
             DVec3::from_array(flux).dot(receiver.normal)
         });
-        assert!(level > 0.0 && its_level > 0.0, "all see some light");
+        // The bottom of the block looks out of the room.
+        if level <= 0.0 {
+            let none = [Rgb::ZERO; directional::COEFFICIENTS];
+            assert_eq!([a.coefficients, b.coefficients], [none; 2]);
+            dark += 1;
+            continue;
+        }
+        assert!(its_level > 0.0, "{level} is not {its_level}");
         for k in 0..directional::COEFFICIENTS {
             let its = b.coefficients[k].x * level / its_level;
             made += (a.coefficients[k].x - its).powi(2);
@@ -335,7 +341,8 @@ fn directions_go_with_the_map_and_state_their_error() {
         }
     }
     let ratio = f64::sqrt(made / stated);
-    println!("{ratio} of the stated error");
+    println!("{ratio} of the stated error, {dark} are dark");
+    assert!(dark * 20 < found.estimates.len(), "{dark} are dark");
     // What patches leave is stated but common to both seeds, and joining has a bias that is stated and common in part.
     assert!((0.3..1.2).contains(&ratio), "{ratio}");
 }

@@ -217,7 +217,7 @@ pub fn bytes<const N: usize>(
 ) -> Vec<u8> {
     let values = estimates
         .iter()
-        .flat_map(|estimate| array(estimate).iter().flat_map(|value| value.to_array()));
+        .flat_map(|estimate| array(estimate).iter().flat_map(Rgb::to_array));
     values
         .flat_map(|value| (value as f32).to_le_bytes())
         .collect()

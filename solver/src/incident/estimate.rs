@@ -182,7 +182,7 @@ pub fn error_parts<const N: usize>(incidents: &[Incident<N>]) -> ErrorParts {
 
 /// Replicates farther apart, about the same mean.
 pub(super) fn widened<const N: usize>(replicates: &Replicates<N>, widening: f32) -> Replicates<N> {
-    let mean = mean(replicates).map(|m| m.as_vec3());
+    let mean = mean(replicates).map(Rgb::as_vec3);
     replicates.map(|row| -> [Vec3; N] {
         std::array::from_fn(|k| mean[k] + (row[k] - mean[k]) * widening)
     })

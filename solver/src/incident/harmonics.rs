@@ -169,10 +169,10 @@ mod tests {
     /// coefficients.
     #[test]
     fn light_from_one_direction_is_known_to_the_stated_rest() {
+        const COUNT: u32 = 1 << 14;
         let towards = DVec3::new(0.48, -0.6, 0.64);
         let coefficients = basis::<MOST>(towards).map(Rgb::splat);
         let (mut largest, mut squares, mut own) = (0.0_f64, 0.0, 0.0);
-        const COUNT: u32 = 1 << 14;
         for normal in directions(COUNT) {
             let found = irradiance(&coefficients, normal).0.x;
             let rest = towards.dot(normal).max(0.0) - found;

@@ -69,7 +69,7 @@ pub fn joined<const N: usize>(
 /// What cells are chosen by.
 fn value<const N: usize>(receiver: &Receiver, incident: &Incident<N>) -> Value {
     let values = incident.gathered.map(|row| {
-        let row: [Rgb; N] = row.map(|value| value.as_dvec3());
+        let row: [Rgb; N] = row.map(Vec3::as_dvec3);
         // Degree two says more of where light comes from than of how much of it there is.
         let low: [Rgb; 4] = std::array::from_fn(|k| row[k]);
         irradiance(&low, receiver.normal).0.element_sum()

@@ -164,7 +164,7 @@ pub fn incident<const N: usize>(
             let mut projector = Projector::<N>::new(lights, world.bvh());
             let projected = projector.project(places, items, &seeds, config.shadow_rays);
             for (found, projected) in found.iter_mut().zip(projected) {
-                found.direct = projected.map(|row| row.map(|value| value.as_vec3()));
+                found.direct = projected.map(|row| row.map(Rgb::as_vec3));
             }
         }
         if follows {

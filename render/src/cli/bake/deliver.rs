@@ -64,10 +64,10 @@ impl Delivery<'_> {
                 error: layer.error.luxels,
             };
             let pages = each_page(atlas.pages, |page| self.write_page(layer, &of, page))?;
-            let directional = match &layer.directional {
-                Some(maps) => Some(maps.write(self.folder, of.layer(), &layer.maps.map)?),
-                None => None,
-            };
+            let directional = layer.directional.as_ref();
+            let directional = directional
+                .map(|maps| maps.write(self.folder, of.layer(), &layer.maps.map))
+                .transpose()?;
             described.push(manifest::Layer {
                 directional,
                 pages,
@@ -90,14 +90,10 @@ impl Delivery<'_> {
             let validity = png::encode_grey8(&raw.validity(index), atlas.size)?;
             self.folder.write(&page.validity, &validity)?;
         }
-        let volume = match &self.baked.volume {
-            Some(volume) => Some(volume.write(self.folder)?),
-            None => {
-                // That of an older bake is of another scene.
-                self.folder.remove(crate::volume::file::HEADER)?;
-                None
-            }
-        };
+        // That of an older bake is of another scene.
+        self.folder.remove(crate::volume::file::HEADER)?;
+        let volume = self.baked.volume.as_ref();
+        let volume = volume.map(|volume| volume.write(self.folder)).transpose()?;
         let files = lightmap.pages.iter().map(|page| page.file.clone());
         let files: Vec<String> = files.collect();
         self.folder.write(
