@@ -79,13 +79,16 @@ fn exporting_is_baking() {
                 .map(Vec::len);
             assert!(pages > Some(1), "{pages:?}");
         }
-        for (target, format) in [
+        let all = [
             ("bevy", "ktx2"),
             ("godot", "rgbm"),
             ("three", "hdr"),
             ("blender", "exr"),
             ("raw", "exr"),
-        ] {
+        ];
+        // Of the glTF document nothing depends on the format but names.
+        let first = if scene == "cornell" { 0 } else { 3 };
+        for (target, format) in all.into_iter().skip(first) {
             let handed = ["--for", target, "--format", format];
             let [direct, out] = ["direct", "out"]
                 .map(|name| folder.path().join(format!("{scene} {target} {name}")));
@@ -224,7 +227,7 @@ fn what_is_no_whole_bake_is_refused() {
         &bytes[..bytes.len() / 2],
     )
     .expect("written");
-    refused(&[], ExitCode::Failure, &["lightmap_000_master.exr"]);
+    refused(&[], ExitCode::InvalidInput, &["lightmap_000_master.exr"]);
     fs::write(baked.join("scene.glb"), "glTF").expect("written");
     refused(&[], ExitCode::Failure, &["not the scene of a bake"]);
     let outcome = export(&baked, &baked, &[]);

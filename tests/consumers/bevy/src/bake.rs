@@ -113,13 +113,17 @@ impl Bake {
         &self.masters[page]
     }
 
-    /// Where the manifest says that an object lies on a page.
-    pub fn rectangle(&self, object: &str, page: usize) -> Option<Rectangle<usize>> {
+    /// Where the manifest says that objects lie on a page; nodes of one name are told apart there by a number.
+    pub fn rectangles(&self, object: &str, page: usize) -> Vec<Rectangle<usize>> {
         let objects = self.manifest["objects"].as_array().expect("objects");
-        let own = objects.iter().find(|own| own["name"] == object)?;
-        let rectangles = own["rectangles"].as_array().expect("rectangles");
-        let own = rectangles.iter().find(|own| own["page"] == page)?;
-        Some(serde_json::from_value(own.clone()).expect("a rectangle"))
+        let own = objects.iter().filter(|own| {
+            let rest = text(&own["name"]).strip_prefix(object);
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        });
+        own.flat_map(|own| own["rectangles"].as_array().expect("rectangles"))
+            .filter(|own| own["page"] == page)
+            .map(|own| serde_json::from_value(own.clone()).expect("a rectangle"))
+            .collect()
     }
 
     /// The number that the manifest states.
