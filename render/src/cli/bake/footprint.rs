@@ -1,5 +1,6 @@
 //! What a bake holds.
 
+use super::deliver::bytes_to_preview;
 use super::{Bake, Include};
 use crate::cli::Context;
 use crate::cli::exit::Failure;
@@ -101,12 +102,11 @@ impl Bake {
         let layers = self.include.len() - usize::from(masks > 0);
         // While the last is gathered all others are there; masks come after maps.
         let others = if masks > 0 { layers } else { layers - 1 };
-        let last = gathered
-            .max(sampled)
-            .max(maps + 2 * Picture::bytes_for(page, 1));
+        let delivered = (2 * Picture::bytes_for(page, 1)).max(bytes_to_preview(world.scene()));
+        let last = gathered.max(sampled).max(maps + delivered);
         Footprint::of(world)
             .with("luxels", found.max(luxels::bytes_to_find(texels)))
-            .with("what is gathered at them, or maps of it", last)
+            .with("what is gathered at them, or maps and preview", last)
             .with("other maps", others * maps)
             .with("masks", Mask::bytes_for(texels, masks))
     }
