@@ -147,6 +147,11 @@ impl Film {
         pixels * size_of::<Pixel>()
     }
 
+    /// The same while it is exposed, in bytes: beside each pixel, what it is to take.
+    pub fn bytes_to_expose(pixels: usize) -> usize {
+        Self::bytes_for(pixels) + pixels * (size_of::<Exposure<'_>>() + size_of::<u32>())
+    }
+
     /// The same while it is judged and exposed further: of each channel values, levels and scatters, and what is made
     /// of them.
     pub fn bytes_to_refine(pixels: usize) -> usize {

@@ -9,7 +9,8 @@ const MOST: i64 = 10_000;
 /// How often light is reflected.
 #[derive(clap::Args, Clone, Copy, Debug, serde::Serialize)]
 pub(super) struct Reflections {
-    /// Times that light may be reflected between surfaces: 0 is direct light alone [default: as often as it is]
+    /// Times that light may be reflected between surfaces, in pictures before it is reflected to the eye: 0 is direct light alone
+    /// [default: as often as it is]
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = clap::value_parser!(u32).range(0..=MOST))]
     bounces: Option<u32>,
 }

@@ -5,6 +5,7 @@ use crate::camera::CameraFrame;
 use crate::cli::exit::Failure;
 use crate::cli::reporter::Reporter;
 use crate::files::OutputFolder;
+use crate::film::Film;
 use crate::image::exr::{self, Picture};
 use crate::image::{Image, png};
 use crate::integrators::{Samples, expose};
@@ -147,16 +148,9 @@ impl Delivery<'_> {
         Ok(described)
     }
 
-    /// The scene with its maps, from its first camera or one that sees most of it.
+    /// The scene with its maps.
     fn preview(&self) -> Result<Image, Failure> {
-        let scene = self.world.scene();
-        let camera = scene
-            .cameras
-            .first()
-            .cloned()
-            .unwrap_or_else(|| overview(scene));
-        let side = camera.size[0].max(camera.size[1]);
-        let size = camera.size.map(|s| (s * PREVIEW_SIDE / side.max(1)).max(1));
+        let (camera, size) = view_of(self.world.scene());
         let frame = CameraFrame::new(&camera, size)?;
         let view = LightmapView::new(
             self.world,
@@ -215,6 +209,21 @@ impl Delivery<'_> {
             seed: self.seed,
         }
     }
+}
+
+/// What the preview shows, from the first camera or one that sees most of the scene, and its size in pixels.
+fn view_of(scene: &Scene) -> (Camera, [usize; 2]) {
+    let first = scene.cameras.first().cloned();
+    let camera = first.unwrap_or_else(|| overview(scene));
+    let side = camera.size[0].max(camera.size[1]);
+    let size = camera.size.map(|s| (s * PREVIEW_SIDE / side.max(1)).max(1));
+    (camera, size)
+}
+
+/// Memory while the preview of a scene is made, in bytes.
+pub(super) fn bytes_to_preview(scene: &Scene) -> usize {
+    let (_, [width, height]) = view_of(scene);
+    Film::bytes_to_expose(width * height) + Picture::bytes_for(width * height, 0)
 }
 
 /// Pages that are encoded at a time, whatever the number of threads: what a command holds does not depend on that.

@@ -1,6 +1,6 @@
 //! What a bake holds.
 
-use super::deliver::PAGES_AT_A_TIME;
+use super::deliver::{PAGES_AT_A_TIME, bytes_to_preview};
 use super::{Bake, Directional, Include};
 use crate::cli::Context;
 use crate::cli::exit::Failure;
@@ -113,13 +113,15 @@ impl Bake {
         // While the last is gathered all others are there; masks and volumes come after maps.
         let comes_after = masks > 0 || volume > 0;
         let others = if comes_after { layers } else { layers - 1 };
+        let pages = PAGES_AT_A_TIME * Picture::bytes_for(page, 1);
+        let delivered = pages.max(bytes_to_preview(world.scene()));
         let last = gathered
             .max(sampled)
             .max(maps + directions + of_directions)
-            .max(maps + PAGES_AT_A_TIME * Picture::bytes_for(page, 1));
+            .max(maps + delivered);
         Ok(Footprint::of(world)
             .with("luxels", found.max(luxels::bytes_to_find(texels)))
-            .with("what is gathered at them, or maps of it", last)
+            .with("what is gathered at them, or maps and preview", last)
             .with("other maps", others * (maps + of_directions))
             .with("the irradiance volume", volume)
             .with("masks", Mask::bytes_for(texels, masks)))
