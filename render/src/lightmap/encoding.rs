@@ -184,7 +184,7 @@ impl Scaled<'_> {
             bytes,
             scale,
             error,
-            clamped: values.filter(|&x| within(x, range) != x).count(),
+            clamped: values.filter(|x| !(0.0..=range).contains(x)).count(),
         })
     }
 

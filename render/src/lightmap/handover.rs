@@ -1,13 +1,16 @@
 //! What is made of a bake for one consumer: maps in the unit and the kind of file that it wants, their description, and a snippet.
 //!
 //! `luxel bake` and `luxel export` both end here and begin with the same: masters in 32-bit floats, E in W/m² or lx, or openness. So
-//! exporting a bake for somebody gives the same bytes as baking it for him.
+//! exporting a bake for somebody gives the same bytes as baking it for them.
+
+mod origin;
+
+pub use origin::{Common, Of, Values};
 
 use super::encoding::{EncodeMapError, Encoded, Format, MissingFeature, Scaled};
 use super::manifest::{Bevy, Encoding, Manifest, Page, Units};
 use super::target::{Quantity, Target};
 use crate::image::Image;
-use crate::image::exr::{Baked, Origin};
 use clap::ValueEnum;
 use luxel_scenes::UnitSystem;
 
@@ -21,9 +24,9 @@ pub struct Handover {
 /// Why maps are not made for somebody in some kind of file.
 #[derive(Debug, thiserror::Error)]
 pub enum HandoverError {
-    /// He could not load them.
+    /// The consumer could not load them.
     #[error(
-        "--format {}: --for {} loads {}; choose one of these, or --for raw", word(*.format), word(*.target), known(*.target)
+        "--format {}: --for {} loads {}; choose one of these, or --for raw", word(.format), word(.target), known(*.target)
     )]
     Unknown {
         /// For whom.
@@ -34,43 +37,6 @@ pub enum HandoverError {
     /// The program cannot make them.
     #[error(transparent)]
     Missing(#[from] MissingFeature),
-}
-
-/// What is known of all maps of a bake.
-#[derive(Clone, Copy, Debug)]
-pub struct Common<'a> {
-    /// The program and its version.
-    pub software: &'a str,
-    /// Name of the scene.
-    pub scene: &'a str,
-    /// What its light is counted in.
-    pub units: UnitSystem,
-    /// Seed of all randomness.
-    pub seed: u64,
-}
-
-/// What is known of all pages of a set of maps.
-#[derive(Clone, Copy, Debug)]
-pub struct Of<'a> {
-    /// The bake.
-    pub common: Common<'a>,
-    /// What they hold: `all`, `direct` or `indirect` light, or `ao`.
-    pub include: &'a str,
-    /// Whether they are the maps that the delivered scene names.
-    pub is_first: bool,
-    /// Relative error of the light at luxels.
-    pub error: f64,
-}
-
-/// What a map holds beside what is delivered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Values {
-    /// Light or openness, filled and filtered.
-    Master,
-    /// Its standard error.
-    Error,
-    /// What was gathered.
-    Luxels,
 }
 
 /// A page as files with their names.
@@ -91,83 +57,11 @@ impl Files {
     }
 }
 
-impl Of<'_> {
-    /// The first part of the names of its files.
-    pub fn stem(&self, page: usize) -> String {
-        format!("{}_{page:03}", self.layer())
-    }
-
-    /// What the names of the files of all its pages begin with.
-    pub fn layer(&self) -> &str {
-        if self.is_first {
-            "lightmap"
-        } else {
-            self.include
-        }
-    }
-
-    /// Whether it is light, and not openness.
-    fn is_light(&self) -> bool {
-        self.include != "ao"
-    }
-
-    /// What a file says of a page that is not delivered to a consumer.
-    pub fn origin(&self, values: Values, page: usize) -> Origin {
-        let what = if self.is_light() {
-            "irradiance"
-        } else {
-            "openness"
-        };
-        let quantity = match values {
-            Values::Master => what.to_owned(),
-            Values::Error => format!("standard error of {what}"),
-            Values::Luxels => format!("{what} at luxels"),
-        };
-        let unit = match self.common.units {
-            _ if !self.is_light() => "1",
-            UnitSystem::Radiometric => "W/m2",
-            UnitSystem::Photometric => "lx",
-        };
-        self.described(quantity, unit, page)
-    }
-
-    /// What a file says of a page that is.
-    fn delivered(&self, quantity: Quantity, page: usize) -> Origin {
-        if quantity == Quantity::Irradiance || !self.is_light() {
-            return self.origin(Values::Master, page);
-        }
-        let unit = match self.common.units {
-            UnitSystem::Radiometric => "W/(m2 sr)",
-            UnitSystem::Photometric => "cd/m2",
-        };
-        self.described("white radiance".into(), unit, page)
-    }
-
-    fn described(&self, quantity: String, unit: &str, page: usize) -> Origin {
-        let Common {
-            software,
-            scene,
-            seed,
-            ..
-        } = self.common;
-        Origin::Baked(Baked {
-            software: software.to_owned(),
-            scene: scene.to_owned(),
-            include: self.include.to_owned(),
-            quantity,
-            unit: unit.to_owned(),
-            error: self.error,
-            page,
-            seed,
-        })
-    }
-}
-
 impl Handover {
-    /// Maps for somebody, in the kind of file that is asked for or else the one that suits him best.
+    /// Maps for somebody, in the kind of file that is asked for or else the one that suits the consumer best.
     ///
     /// # Errors
-    /// When he does not load that kind, or this program does not make it.
+    /// When the consumer does not load that kind, or this program does not make it.
     pub fn new(target: Target, format: Option<Format>) -> Result<Self, HandoverError> {
         let format = format.unwrap_or(target.formats()[0]);
         if !target.formats().contains(&format) {
@@ -175,11 +69,6 @@ impl Handover {
         }
         format.require()?;
         Ok(Self { target, format })
-    }
-
-    /// Whom the maps are for.
-    pub fn target(self) -> Target {
-        self.target
     }
 
     /// The files of a page with a master. Openness is the same to everybody; light is what the consumer wants.
@@ -290,7 +179,7 @@ pub fn loss(manifest: &Manifest) -> Option<String> {
     (format != Format::Exr).then(|| {
         format!(
             "{} changes maps by at most {:.2e} (root mean square over the mean of a page)",
-            word(format),
+            word(&format),
             loss
         )
     })
@@ -303,7 +192,7 @@ fn pages(manifest: &Manifest) -> impl Iterator<Item = &Page> {
 }
 
 /// A value as the command line calls it.
-fn word(value: impl ValueEnum) -> String {
+fn word(value: &impl ValueEnum) -> String {
     value
         .to_possible_value()
         .map(|value| value.get_name().to_owned())
@@ -312,11 +201,7 @@ fn word(value: impl ValueEnum) -> String {
 
 /// The kinds of file that somebody loads, as a list.
 fn known(target: Target) -> String {
-    let names: Vec<String> = target
-        .formats()
-        .iter()
-        .map(|format| word(*format))
-        .collect();
+    let names: Vec<String> = target.formats().iter().map(word).collect();
     names.join(", ")
 }
 
@@ -325,7 +210,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn everybody_gets_what_he_loads() {
+    fn everybody_gets_what_is_loaded_there() {
         for target in Target::value_variants() {
             for format in Format::value_variants() {
                 let found = Handover::new(*target, Some(*format));

@@ -10,8 +10,8 @@
 //! | Blender | emission of texel · albedo | E/π | exr, hdr, rgbm |
 //! | Unity | texel · albedo | E/π | exr, hdr |
 //!
-//! Sources: three.js `lights_fragment_maps.glsl.js`, Bevy `lightmap.wesl` and `pbr_functions.wesl`. three.js and Blender were held against
-//! luxel's own pictures, and Bevy's loaders against the masters (`tests/consumers`); what is said of Godot and Unity is their common use
+//! Sources: three.js `lights_fragment_maps.glsl.js`, Bevy `lightmap.wesl` and `pbr_functions.wesl`. three.js was held against luxel's
+//! own pictures, Blender against a furnace, and Bevy's loaders against the masters (`tests/consumers`); what is said of Godot and Unity is their common use
 //! and was not tried there.
 //!
 //! Of files: Bevy 0.19 has `ktx2`, `zstd_rust` and `hdr` among its default features and `exr` not (`bevy/Cargo.toml`), and makes 32-bit

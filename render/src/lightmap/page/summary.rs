@@ -104,7 +104,7 @@ fn units(manifest: &Manifest) -> String {
         ("a texel holds", texel),
         ("colours", escape(&units.colour_space)),
         ("files", files(&manifest.lightmap)),
-        ("made for", name(units.target)),
+        ("made for", name(&units.target)),
         ("exposure", figure(manifest.exposure)),
         ("patches", manifest.lightmap.patches.to_string()),
         ("seed", manifest.seed.to_string()),
@@ -116,7 +116,7 @@ fn units(manifest: &Manifest) -> String {
 fn files(lightmap: &Layer) -> String {
     let encodings = lightmap.pages.iter().map(|page| &page.encoding);
     let loss = encodings.clone().map(|own| own.loss).fold(0.0, f64::max);
-    let format = encodings.map(|own| name(own.format)).next();
+    let format = encodings.map(|own| name(&own.format)).next();
     format!(
         "{}, which changes {}",
         format.unwrap_or_default(),
@@ -181,7 +181,7 @@ fn light(include: &str) -> &str {
 }
 
 /// A value as the command line calls it.
-fn name(value: impl ValueEnum) -> String {
+fn name(value: &impl ValueEnum) -> String {
     value
         .to_possible_value()
         .map(|value| value.get_name().to_owned())
