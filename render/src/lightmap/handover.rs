@@ -9,7 +9,7 @@ pub use origin::{Common, Of, Values};
 
 use super::encoding::{EncodeMapError, Encoded, Format, MissingFeature, Scaled};
 use super::manifest::{Bevy, Encoding, Manifest, Page, Units};
-use super::target::{Quantity, Target};
+use super::target::Target;
 use crate::image::Image;
 use clap::ValueEnum;
 use luxel_scenes::UnitSystem;
