@@ -1,9 +1,11 @@
 //! Coefficients with their errors, and the error of the irradiance that they describe.
 //!
-//! The scatter of four replicates is that of all noise. Where one coefficient of a place is noisy the others are too, so that the scatters of each
-//! are [moderated](crate::error::moderate) towards a share of the sum of them all, the same everywhere. What patches of finite size leave is judged from the difference from a coarser
-//! mesh ([`crate::error::discretisation`]). Because the basis is orthonormal, the variance of E(n), the mean over all n, follows from those of the coefficients
-//! without their covariances ([`harmonics::mean_square`](super::harmonics::mean_square)): it is what errors of all places together are made of.
+//! The scatter of four replicates is that of all noise. Where one coefficient of a place is noisy the others are too, so that
+//! the scatters of each are [moderated](crate::error::moderate) towards a share of the sum of them all, the same everywhere.
+//! What patches of finite size leave is judged from the difference from a coarser mesh ([`crate::error::discretisation`]).
+//!
+//! Because the basis is orthonormal, the variance of E(n), the mean over all n, follows from those of the coefficients without their
+//! covariances ([`harmonics::mean_square`](super::harmonics::mean_square)): errors of all places together are made of it.
 
 use super::harmonics::{mean_irradiance, mean_square, vector_irradiance};
 use super::{Incident, Replicates};

@@ -1,16 +1,14 @@
 //! Incident radiance at points, projected on spherical harmonics: what a normal that is not known yet would receive.
 //!
 //! L_k = ∫ L Y_k dω over the hemisphere above a luxel, or over all directions around a probe in the air ([`harmonics`]). Light of sources
-//! is projected by shadow rays ([`direct`]), everything else by rays of a known density p that look the radiosity solution up as the final gather's
+//! is projected by shadow rays (`direct`), everything else by rays of a known density p that look the radiosity solution up as the final gather's
 //! do, near chains included ([`crate::gather`]): (1/M) Σ L(ω_m) Y_k(ω_m) / p(ω_m). Probes cast their rays evenly, for which no
 //! coefficient is better known than another (Σ Y_lm² over m is the same in all directions); luxels half evenly and half by the cosine
 //! ([`mixed_hemisphere`]), because the cosine alone would give light at the horizon weights without bound.
 //!
 //! Replicate r is gather r with what solution r shows more than the mean of all, so that the scatter of [`MAX_REPLICATES`] replicates tells
 //! the noise of both ([`estimate`]). Unbiased but for the finite size of patches, which a coarser mesh at the same hits makes known, and for
-//! penumbrae of sources as [`direct`] says. Cost: M rays and S shadow rays a place, half of them continued once.
-//!
-//! [`direct`]: self::direct
+//! penumbrae of sources as `direct` says. Cost: M rays and S shadow rays a place, half of them continued once.
 
 mod direct;
 pub mod estimate;
