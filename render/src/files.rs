@@ -162,11 +162,19 @@ impl OutputFolder {
     /// # Errors
     /// When the system refuses.
     pub fn remove_temporaries(&self) -> Result<(), OutputError> {
-        let refused = |error| OutputError::Refused(self.0.clone(), error);
         let _held = hold_writes();
+        self.remove_all(|name| name.starts_with(TEMPORARY))
+    }
+
+    /// Removes the files in it whose names suit.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn remove_all(&self, suits: impl Fn(&str) -> bool) -> Result<(), OutputError> {
+        let refused = |error| OutputError::Refused(self.0.clone(), error);
         for entry in fs::read_dir(&self.0).map_err(refused)? {
             let name = entry.map_err(refused)?.file_name();
-            if let Some(name) = name.to_str().filter(|name| name.starts_with(TEMPORARY)) {
+            if let Some(name) = name.to_str().filter(|name| suits(name)) {
                 self.remove(name)?;
             }
         }

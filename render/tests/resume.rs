@@ -11,7 +11,16 @@ const KILLS: usize = 20;
 const CHAIN: usize = 4;
 
 /// Long enough for some rounds, short enough to be done again and again.
-const OPTIONS: [&str; 6] = ["--size", "64", "--error", "1%", "--include", "all,indirect"];
+const OPTIONS: [&str; 8] = [
+    "--size",
+    "48",
+    "--error",
+    "1.5%",
+    "--include",
+    "all,ao",
+    "--max-distance",
+    "0.3",
+];
 
 fn scene() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/data/cornell/cornell.toml")
@@ -26,7 +35,7 @@ fn bake(folder: &Path, further: &[&str]) -> Command {
         .arg("-o")
         .arg(folder)
         .args(OPTIONS)
-        .args(["--checkpoint-every", "1ms", "--progress", "none"])
+        .args(["--checkpoint-every", "20ms", "--progress", "none"])
         .args(further)
         .stdout(Stdio::null());
     command
@@ -43,7 +52,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
                 entry.path(),
             )
         })
-        .filter(|(name, _)| !name.starts_with(".luxel-") && name != "checkpoint.luxel")
+        .filter(|(name, _)| !name.starts_with(".luxel-") && !name.starts_with("checkpoint"))
         .map(|(name, path)| (name, std::fs::read(path).expect("readable")))
         .collect()
 }
@@ -167,7 +176,7 @@ fn stopped_by_the_user_a_bake_can_go_on() {
     let bake = |folder: &Path, further: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_luxel"));
         command.arg("bake").arg(scene()).arg("-o").arg(folder);
-        command.args(["--size", "96", "--error", "0.4%"]);
+        command.args(["--size", "64", "--error", "0.5%"]);
         command.args(rarely).args(further).stderr(Stdio::piped());
         command
     };

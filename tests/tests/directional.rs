@@ -442,7 +442,7 @@ fn what_has_no_effect_or_no_room_is_refused() {
         (
             &["--include", "ao", "--volume", "0.5"],
             ExitCode::Usage,
-            "--include ao",
+            "volumes hold the light",
         ),
         (&["--volume-order", "1"], ExitCode::Usage, "--volume-order"),
         (

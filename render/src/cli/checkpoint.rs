@@ -1,7 +1,8 @@
 //! Checkpoints: long work that can go on after the process has ended, whatever ended it.
 //!
 //! A file holds the name of the format, a line of JSON with the [`Identity`] of the work, what was found so far, and a
-//! checksum. It is written whole or not at all, every so often and when the user stops the work. Scene, atlas, meshes and
+//! checksum. It is written whole or not at all, every so often and when the user stops the work; each set of maps that is complete
+//! while more are to come has a file of its own, so that it need not be held in memory. Scene, atlas, meshes and
 //! solutions are made anew from the same input: what goes on from a checkpoint ends with the same bytes as what was never
 //! interrupted.
 
@@ -14,16 +15,21 @@ use crate::lightmap::manifest::Energy;
 use luxel_scenes::Scene;
 use luxel_solver::adaptive;
 use luxel_solver::gather::Gathered;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 use std::cell::{Cell, OnceCell, RefCell};
 use std::fmt::{self, Write as _};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// The file's name.
+/// The name of the file of the work in progress.
 const NAME: &str = "checkpoint.luxel";
+
+/// The name of the file of a set of maps that is complete.
+fn name_of(index: usize) -> String {
+    format!("checkpoint_{index}.luxel")
+}
 
 /// What it begins with; the number is that of the format.
 const MAGIC: &str = "luxel checkpoint 1\n";
@@ -139,11 +145,10 @@ pub(super) enum Current<'a> {
     Film(Refined<'a>),
 }
 
-/// What was found so far.
+/// The set of maps in progress.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
-struct Found<'a> {
-    /// Sets of maps that are complete.
-    complete: Cow<'a, [AtLuxels]>,
+struct InProgress<'a> {
+    index: usize,
     current: Current<'a>,
 }
 
@@ -168,9 +173,11 @@ pub(super) struct Keeper<'a, 'r> {
     every: Duration,
     last: Cell<Instant>,
     context: &'a Context<'r>,
-    complete: RefCell<Vec<AtLuxels>>,
+    resume: Cell<Resume>,
+    /// The set of maps that is worked on.
+    index: Cell<usize>,
     /// What the checkpoint that is gone on from was in the middle of.
-    current: RefCell<Option<Current<'static>>>,
+    found: RefCell<Option<InProgress<'static>>>,
     is_refused: Cell<bool>,
 }
 
@@ -191,19 +198,21 @@ impl<'a, 'r> Keeper<'a, 'r> {
             every,
             last: Cell::new(Instant::now()),
             context,
-            complete: RefCell::default(),
-            current: RefCell::default(),
+            resume: Cell::new(Resume::Anew),
+            index: Cell::new(0),
+            found: RefCell::default(),
             is_refused: Cell::new(false),
         }
     }
 
-    /// Takes up the checkpoint of the folder, if there is one, or tells that there is one.
+    /// Takes up the checkpoint of the folder, if there is one and `resume` says so.
     ///
     /// # Errors
     /// When it is broken or of other work.
     pub(super) fn take_up(&self, resume: Resume) -> Result<(), Failure> {
         let path = self.folder.path().join(NAME);
         let reporter = &self.context.reporter;
+        self.resume.set(resume);
         match (resume, path.exists()) {
             (Resume::Anew, false) => {}
             (Resume::Anew, true) => reporter.note(format_args!(
@@ -215,17 +224,12 @@ impl<'a, 'r> Keeper<'a, 'r> {
                 path.display()
             )),
             (Resume::GoOn, true) => {
-                let found = read(&path, self.identity()).map_err(|error| {
-                    let exit = match error {
-                        CheckpointError::Unreadable(..) => ExitCode::Failure,
-                        _ => ExitCode::InvalidInput,
-                    };
-                    Failure::new(exit, error)
-                })?;
-                self.complete.replace(found.complete.into_owned());
-                self.current.replace(Some(found.current));
+                self.found.replace(Some(self.read(&path)?));
                 reporter.note(format_args!("going on from {}", path.display()));
             }
+        }
+        if resume == Resume::Anew {
+            self.remove_complete()?;
         }
         Ok(())
     }
@@ -238,36 +242,49 @@ impl<'a, 'r> Keeper<'a, 'r> {
         })
     }
 
-    /// The set of maps with this number, when it is complete.
-    pub(super) fn complete(&self, index: usize) -> Option<AtLuxels> {
-        self.complete.borrow().get(index).cloned()
+    /// Work on the set of maps with this number begins. Returns it where it is complete.
+    ///
+    /// # Errors
+    /// When its file is broken or of other work.
+    pub(super) fn begin(&self, index: usize) -> Result<Option<AtLuxels>, Failure> {
+        self.index.set(index);
+        let path = self.folder.path().join(name_of(index));
+        if self.resume.get() == Resume::GoOn && path.exists() {
+            return self.read(&path).map(Some);
+        }
+        Ok(None)
     }
 
-    /// What the checkpoint was in the middle of, once.
+    /// What the checkpoint was in the middle of, once, if that is what is worked on.
     pub(super) fn current(&self) -> Option<Current<'static>> {
-        self.current.take()
+        let found = self.found.take()?;
+        if found.index == self.index.get() {
+            return Some(found.current);
+        }
+        self.found.replace(Some(found));
+        None
     }
 
-    /// A set of maps is complete.
-    pub(super) fn add(&self, index: usize, maps: AtLuxels) {
-        let mut complete = self.complete.borrow_mut();
-        if index == complete.len() {
-            complete.push(maps);
+    /// What is worked on is complete, and more will follow.
+    pub(super) fn keep_complete(&self, maps: &AtLuxels) {
+        if self.context.started.elapsed() >= self.every {
+            self.try_to_write(&name_of(self.index.get()), maps);
         }
     }
 
     /// Keeps what there is when it is time, or when the user stops the work. That it cannot be written ends nothing.
     pub(super) fn keep(&self, current: Current<'_>) {
         let is_due = self.last.get().elapsed() >= self.every;
-        if !is_due && !self.context.interrupt.is_set() {
-            return;
+        if is_due || self.context.interrupt.is_set() {
+            let index = self.index.get();
+            self.try_to_write(NAME, &InProgress { index, current });
+            self.last.set(Instant::now());
         }
-        let complete = self.complete.borrow();
-        let found = Found {
-            complete: Cow::Borrowed(&complete),
-            current,
-        };
-        if let Err(failure) = self.write(&found)
+    }
+
+    /// Writes a file, or warns once that none is kept.
+    fn try_to_write(&self, name: &str, found: &impl Serialize) {
+        if let Err(failure) = self.write(name, found)
             && !self.is_refused.replace(true)
         {
             let error = &failure.error;
@@ -275,12 +292,11 @@ impl<'a, 'r> Keeper<'a, 'r> {
                 .reporter
                 .warning(format_args!("no checkpoint is kept: {error}"));
         }
-        self.last.set(Instant::now());
     }
 
-    fn write(&self, found: &Found<'_>) -> Result<(), Failure> {
+    fn write(&self, name: &str, found: &impl Serialize) -> Result<(), Failure> {
         let identity = serde_json::to_string(self.identity())?;
-        self.folder.write_with(NAME, |file| {
+        self.folder.write_with(name, |file| {
             let mut file = Summed {
                 file: BufWriter::new(file),
                 sum: crc32fast::Hasher::new(),
@@ -294,11 +310,27 @@ impl<'a, 'r> Keeper<'a, 'r> {
         Ok(())
     }
 
+    fn read<T: DeserializeOwned>(&self, path: &Path) -> Result<T, Failure> {
+        read(path, self.identity()).map_err(|error| {
+            let exit = match error {
+                CheckpointError::Unreadable(..) => ExitCode::Failure,
+                _ => ExitCode::InvalidInput,
+            };
+            Failure::new(exit, error)
+        })
+    }
+
+    fn remove_complete(&self) -> Result<(), OutputError> {
+        let is_complete = |name: &str| name.starts_with("checkpoint_") && name.ends_with(".luxel");
+        self.folder.remove_all(is_complete)
+    }
+
     /// Work is done: there is nothing to go on from.
     ///
     /// # Errors
     /// When the file cannot be removed.
     pub(super) fn finish(&self) -> Result<(), OutputError> {
+        self.remove_complete()?;
         self.folder.remove(NAME)
     }
 
@@ -342,7 +374,7 @@ impl<W: Write> Write for Summed<W> {
 }
 
 /// Reads a checkpoint of certain work.
-fn read(path: &Path, identity: &Identity) -> Result<Found<'static>, CheckpointError> {
+fn read<T: DeserializeOwned>(path: &Path, identity: &Identity) -> Result<T, CheckpointError> {
     let broken = || CheckpointError::Broken(path.to_path_buf());
     let bytes = std::fs::read(path)
         .map_err(|error| CheckpointError::Unreadable(path.to_path_buf(), error))?;

@@ -124,7 +124,7 @@ impl Bake {
         for &include in &self.include {
             let done = of_layer * layers.len();
             let of_light = &goal.part(done + 1, passes);
-            let known = keeper.complete(layers.len());
+            let known = keeper.begin(layers.len())?;
             let gathered = match (known, include, include.components()) {
                 (_, Include::Masks, _) => continue,
                 (Some(complete), ..) => Some(complete),
@@ -164,9 +164,8 @@ impl Bake {
                 layer.directional = found;
             }
             layers.push(layer);
-            let is_last = layers.len() == self.include.len();
-            if !is_last && !context.interrupt.is_set() {
-                keeper.add(layers.len() - 1, gathered);
+            if layers.len() < self.include.len() && !context.interrupt.is_set() {
+                keeper.keep_complete(&gathered);
             }
         }
         let mut volume = None;
