@@ -175,7 +175,7 @@ impl Bake {
                 corners = Some(cut.corners.as_slice());
             }
             let masked = self.masked(&world);
-            let Some(baked) = self.bake(&world, placed, masked, &goal, &keeper, context)? else {
+            let Some(baked) = self.bake(&world, placed, masked, &goal, &keeper)? else {
                 keeper.tell();
                 return Ok(None);
             };

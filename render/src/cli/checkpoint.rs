@@ -205,6 +205,11 @@ impl<'a, 'r> Keeper<'a, 'r> {
         }
     }
 
+    /// What the work may use.
+    pub(super) fn context(&self) -> &'a Context<'r> {
+        self.context
+    }
+
     /// Takes up the checkpoint of the folder, if there is one and `resume` says so.
     ///
     /// # Errors
@@ -321,8 +326,8 @@ impl<'a, 'r> Keeper<'a, 'r> {
     }
 
     fn remove_complete(&self) -> Result<(), OutputError> {
-        let is_complete = |name: &str| name.starts_with("checkpoint_") && name.ends_with(".luxel");
-        self.folder.remove_all(is_complete)
+        self.folder
+            .remove_all(|name| name.starts_with("checkpoint_"))
     }
 
     /// Work is done: there is nothing to go on from.

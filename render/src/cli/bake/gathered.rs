@@ -1,7 +1,6 @@
 //! What luxels see: light by the final gather or by paths, or how open they are.
 
 use super::Bake;
-use crate::cli::Context;
 use crate::cli::checkpoint::{AtLuxels, Current, Keeper};
 use crate::cli::exit::Failure;
 use crate::cli::footprint::{Footprint, held_back};
@@ -29,16 +28,16 @@ const FIRST_PATHS: u32 = 16;
 
 impl Bake {
     /// Light; `None` when it was stopped before there was any.
-    pub(super) fn light<'r>(
+    pub(super) fn light(
         &self,
         world: &World<'_>,
         luxels: &Luxels,
         components: Components,
         held: &Footprint,
         goal: &Goal,
-        keeper: &Keeper<'_, 'r>,
-        context: &Context<'r>,
+        keeper: &Keeper<'_, '_>,
     ) -> Result<Option<AtLuxels>, Failure> {
+        let context = keeper.context();
         let error = first_error(Some(goal));
         let first = self.first_patches(error);
         let bounces = self.reflections.bounces();
@@ -77,15 +76,15 @@ impl Bake {
     }
 
     /// Light by paths; `None` when it was stopped before there was any.
-    pub(super) fn traced<'r>(
+    pub(super) fn traced(
         &self,
         world: &World<'_>,
         luxels: &Luxels,
         components: Components,
         goal: &Goal,
-        keeper: &Keeper<'_, 'r>,
-        context: &Context<'r>,
+        keeper: &Keeper<'_, '_>,
     ) -> Option<AtLuxels> {
+        let context = keeper.context();
         let receivers = &luxels.lit.receivers;
         let bounces = self.reflections.bounces();
         let tracer = PathTracer::new(world, context.common.seed).with_bounces(bounces);
@@ -93,26 +92,18 @@ impl Bake {
             tracer.irradiance(film, receivers, components, paths, progress);
         };
         let alike = |_| Alike::Values;
-        sampled(
-            receivers.len(),
-            FIRST_PATHS,
-            alike,
-            goal,
-            keeper,
-            context,
-            add,
-        )
+        sampled(receivers.len(), FIRST_PATHS, alike, goal, keeper, add)
     }
 
     /// Ambient occlusion; `None` when it was stopped before there was any.
-    pub(super) fn occlusion<'r>(
+    pub(super) fn occlusion(
         &self,
         world: &World<'_>,
         luxels: &Luxels,
         goal: &Goal,
-        keeper: &Keeper<'_, 'r>,
-        context: &Context<'r>,
+        keeper: &Keeper<'_, '_>,
     ) -> Option<AtLuxels> {
+        let context = keeper.context();
         let receivers = &luxels.lit.receivers;
         let occlusion =
             AmbientOcclusion::new(world, self.reach.config(AO_RAYS, context.common.seed));
@@ -123,7 +114,7 @@ impl Bake {
             rays: samples * AO_RAYS,
         };
         let (count, first) = (receivers.len(), FIRST_AO_SAMPLES);
-        let found = sampled(count, first, alike, goal, keeper, context, add)?;
+        let found = sampled(count, first, alike, goal, keeper, add)?;
         let is_black = |gathered: &Gathered| gathered.direct.0.max_element() <= 0.0;
         if !self.reach.is_limited() && found.values.iter().all(is_black) {
             context.reporter.warning(
@@ -136,15 +127,15 @@ impl Bake {
 
 /// Values of independent samples at so many receivers, `first` of each replicate to begin with; `None` when it was stopped before
 /// there was any. `alike` tells how noise is judged where each has so many samples.
-fn sampled<'r>(
+fn sampled(
     receivers: usize,
     first: u32,
     alike: impl Fn(u32) -> Alike,
     goal: &Goal,
-    keeper: &Keeper<'_, 'r>,
-    context: &Context<'r>,
+    keeper: &Keeper<'_, '_>,
     add: impl FnMut(&mut Film, &[u32], &dyn Progress),
 ) -> Option<AtLuxels> {
+    let context = keeper.context();
     let mut steering = Steering::new(context, Some(goal)).keeping(keeper);
     let start = match keeper.current() {
         Some(Current::Film(refined)) => refined,

@@ -101,14 +101,13 @@ impl Bake {
     }
 
     /// Bakes a scene; `None` when it was stopped before all maps were had.
-    pub(super) fn bake<'r>(
+    pub(super) fn bake(
         &self,
         world: &World<'_>,
         placed: Placed,
         masked: Vec<NamedLight>,
         goal: &Goal,
-        keeper: &Keeper<'_, 'r>,
-        context: &Context<'r>,
+        keeper: &Keeper<'_, '_>,
     ) -> Result<Option<Baked>, Failure> {
         let Placed {
             atlas,
@@ -116,6 +115,7 @@ impl Bake {
             held,
             ..
         } = placed;
+        let context = keeper.context();
         let listening = context.interrupt.listen();
         let grid = self.volume.grid(world.scene())?;
         let of_layer = 1 + usize::from(self.directional != Directional::None);
@@ -129,16 +129,16 @@ impl Bake {
                 (_, Include::Masks, _) => continue,
                 (Some(complete), ..) => Some(complete),
                 (None, _, Some(components)) if self.is_traced() => {
-                    self.traced(world, &luxels, components, of_light, keeper, context)
+                    self.traced(world, &luxels, components, of_light, keeper)
                 }
                 (None, _, Some(components)) => {
-                    self.light(world, &luxels, components, &held, of_light, keeper, context)?
+                    self.light(world, &luxels, components, &held, of_light, keeper)?
                 }
-                (None, Include::Ao, _) => self.occlusion(world, &luxels, of_light, keeper, context),
+                (None, Include::Ao, _) => self.occlusion(world, &luxels, of_light, keeper),
                 (None, ..) => {
                     let sky = world.lit_by(Lights::sky_of(world.scene()));
                     let components = Components::Direct;
-                    self.light(&sky, &luxels, components, &held, of_light, keeper, context)?
+                    self.light(&sky, &luxels, components, &held, of_light, keeper)?
                 }
             };
             let Some(gathered) = gathered else {

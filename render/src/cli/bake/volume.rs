@@ -134,10 +134,7 @@ impl Bake {
             context.reporter.detail(format_args!(
                 "volume: {} probes, {} of them inside solids; {} gather and {} shadow rays a probe",
                 volume.estimates.len(),
-                file::validity(&volume)
-                    .iter()
-                    .filter(|valid| **valid == 0)
-                    .count(),
+                volume.is_valid.iter().filter(|valid| !**valid).count(),
                 volume.rays[0],
                 volume.rays[1]
             ));

@@ -147,7 +147,9 @@ impl Attribute {
             }
             let length: f64 = direction.iter().map(|x| x * x).sum();
             let scale = (square / length.max(f64::MIN_POSITIVE)).sqrt();
-            direction.iter_mut().for_each(|x| *x *= scale);
+            for x in direction {
+                *x *= scale;
+            }
         }
         let bytes = sums.iter().map(|&sum| component_bytes(kind, sum));
         Some(bytes.collect::<Option<Vec<_>>>()?.concat())

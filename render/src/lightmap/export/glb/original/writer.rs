@@ -160,6 +160,9 @@ fn write_primitive(
     primitive
 }
 
+/// What a vertex is made of and its place in the atlas, bit by bit.
+type Identity = (Vec<(u32, u64)>, [u32; 2]);
+
 /// The vertices that faces need: one for each vertex of the file and place in the atlas, in the order of the faces.
 struct Split {
     indices: Vec<u32>,
@@ -174,7 +177,7 @@ impl Split {
         let Baked { scene, atlas, .. } = baked;
         let origin = source.run(run);
         let (mut indices, mut numbers, mut places) = (Vec::new(), Vec::new(), Vec::new());
-        let mut known: HashMap<(Vec<(u32, u64)>, [u32; 2]), u32> = HashMap::new();
+        let mut known: HashMap<Identity, u32> = HashMap::new();
         for face in faces {
             let mut corners: Vec<usize> = scene.faces[face.index()].corners().collect();
             if origin.is_mirrored {
