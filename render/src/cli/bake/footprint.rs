@@ -15,7 +15,7 @@ use crate::lightmap::luxels::{self, Luxel};
 use crate::lightmap::map::Lightmap;
 use crate::lightmap::masks::Mask;
 use luxel_solver::adaptive;
-use luxel_solver::gather::{Components, Gathered};
+use luxel_solver::gather::{Components, Gathered, Tally};
 use luxel_solver::world::{Receiver, World};
 
 impl Bake {
@@ -113,6 +113,18 @@ impl Bake {
         // While the last is gathered all others are there; masks and volumes come after maps.
         let comes_after = masks > 0 || volume > 0;
         let others = if comes_after { layers } else { layers - 1 };
+        // What a gather has freed the allocator keeps, in part, when the next begins: so much was measured, whatever their number.
+        let gathers = self
+            .include
+            .iter()
+            .filter(|include| gathers(include))
+            .count()
+            + masks;
+        let kept = if gathers > 1 {
+            luxels * (size_of::<Tally>() + size_of::<Gathered>())
+        } else {
+            0
+        };
         let pages = PAGES_AT_A_TIME * Picture::bytes_for(page, 1);
         let delivered = pages.max(bytes_to_preview(world.scene()));
         let last = gathered
@@ -123,6 +135,7 @@ impl Bake {
             .with("luxels", found.max(luxels::bytes_to_find(texels)))
             .with("what is gathered at them, or maps and preview", last)
             .with("other maps", others * (maps + of_directions))
+            .with("what is left of earlier gathers", kept)
             .with("the irradiance volume", volume)
             .with("masks", Mask::bytes_for(texels, masks)))
     }
