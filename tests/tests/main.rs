@@ -3,6 +3,7 @@
 mod agreement;
 mod ambient_occlusion;
 mod bad_input;
+mod bounces;
 mod cie171;
 mod delivery;
 mod determinism;
