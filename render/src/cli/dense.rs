@@ -6,8 +6,8 @@ use crate::progress::Progress;
 use clap::ValueEnum;
 use luxel_scenes::{Irradiance, Rgb};
 use luxel_solver::form_factors::{
-    AnalyticConfig, Hemicube, HemicubeConfig, RayCastConfig, Repair, Target, analytic_factors,
-    hemicube_factors, ray_cast, repair,
+    AnalyticConfig, Hemicube, HemicubeConfig, REPLICATES, RayCastConfig, Repair, Target,
+    analytic_factors, hemicube_factors, ray_cast, repair,
 };
 use luxel_solver::patches::{PatchId, Patches};
 use luxel_solver::solvers::{
@@ -179,15 +179,23 @@ pub(super) fn bytes_for(patches: usize, factors: Factors, solver: Option<Solver>
     let matrix = Dense::bytes_for(patches);
     let threads = rayon::current_num_threads();
     let (errors, computing) = match factors {
-        // Of pairs i ≤ j exchange areas with their errors; rows with their errors, freed as they are put together: as
-        // much as one matrix.
-        Factors::Analytic(_) | Factors::RayCast(_) => (matrix, matrix),
-        // Rows before they are put together. Errors that are never written take no memory.
-        Factors::Hemicube(resolution) => (0, matrix + threads * Hemicube::bytes_for(resolution)),
+        // Of pairs i ≤ j exchange areas with their errors, freed as they are put together: as much as one matrix.
+        Factors::Analytic(_) => (matrix, matrix),
+        // Rows are made where they stay.
+        Factors::RayCast(_) => (matrix, 0),
+        // Errors that are never written take no memory.
+        Factors::Hemicube(resolution) => (0, threads * Hemicube::bytes_for(resolution)),
     };
     let solving = match solver {
         None | Some(Solver::Jacobi | Solver::GaussSeidel) => 0,
-        Some(Solver::Southwell) => Columns::bytes_for(patches, patches * patches),
+        Some(Solver::Southwell) => {
+            // A row has no more entries above zero than rays.
+            let rays = match factors {
+                Factors::RayCast(rays) => rays.next_multiple_of(REPLICATES as usize),
+                Factors::Analytic(_) | Factors::Hemicube(_) => patches,
+            };
+            Columns::bytes_for(patches, patches * patches.min(rays))
+        }
         // Exchange areas and the matrix that is made of them.
         Some(Solver::ConjugateGradient) => 2 * matrix,
         // The matrix as nalgebra has it, the system and its factors.

@@ -14,7 +14,8 @@
 //!
 //! Derivations stand with the formats ([`crate::image`]). Besides the bound the loss is measured: every map is read back,
 //! and [`Encoded::error`] is the root of the mean square of the differences over the mean, of all texels and channels of the page.
-//! What is out of a format's range is moved to its end and counted. Cost: linear in the texels.
+//! What is above a format's range is moved to its end and counted; what noise has brought below zero becomes zero, which only lessens
+//! its error. Cost: linear in the texels.
 
 use crate::image::exr::{self, EncodeExrError, Origin, Picture};
 use crate::image::hdr::{self, EncodeHdrError};
@@ -32,7 +33,7 @@ pub enum Format {
     Hdr,
     /// KTX2 with half floats
     Ktx2,
-    /// KTX2 with blocks of BC6H; needs a luxel built with the feature bc6h
+    /// KTX2 with blocks of BC6H
     Bc6h,
     /// PNG with a multiplier in alpha, for shaders that decode it
     Rgbm,
@@ -61,7 +62,7 @@ pub enum EncodeMapError {
 /// A format that was left out when the program was built.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "this luxel was built without the feature `bc6h`, which --format bc6h needs; build it with: cargo build --release --features bc6h"
+    "this luxel was built without its default feature `bc6h`, which --format bc6h needs; build it with: cargo build --release --features bc6h"
 )]
 pub struct MissingFeature;
 
@@ -83,7 +84,7 @@ pub struct Encoded {
     pub scale: f64,
     /// Measured loss: root mean square of the differences over the mean.
     pub error: f64,
-    /// Channels of texels that were moved to an end of the range.
+    /// Channels of texels that were above the range and were moved to its end.
     pub clamped: usize,
 }
 
@@ -184,7 +185,7 @@ impl Scaled<'_> {
             bytes,
             scale,
             error,
-            clamped: values.filter(|x| !(0.0..=range).contains(x)).count(),
+            clamped: values.filter(|&x| x > range || x.is_nan()).count(),
         })
     }
 

@@ -155,19 +155,18 @@ impl Handover {
     }
 }
 
-/// A sentence for each map that has values out of the range of its kind of file.
+/// A sentence for each map that has values above the range of its kind of file.
 pub fn warnings(manifest: &Manifest) -> impl Iterator<Item = String> {
     let all = pages(manifest).filter(|page| page.encoding.clamped > 0);
     all.map(|page| {
         let Encoding {
             format, clamped, ..
         } = page.encoding;
-        let range = format
-            .largest()
-            .map_or("0 and up".into(), |largest| format!("0 to {largest}"));
+        let most = format.largest().unwrap_or(f64::INFINITY);
         format!(
-            "{}: {clamped} values lie outside of {range} and were moved there; --format exr or hdr keeps them",
-            page.file
+            "{}: {clamped} values lie above {most}, the largest that {} holds, and were moved there; --format exr or hdr keeps them",
+            page.file,
+            word(&format)
         )
     })
 }

@@ -196,7 +196,7 @@ pub struct Encoding {
     pub factor: f64,
     /// What the encoding alone changed: root mean square of the differences over the mean of the page.
     pub loss: f64,
-    /// Values beyond what the format holds, which were moved to its end.
+    /// Values above what the format holds, which were moved to its end.
     pub clamped: usize,
 }
 

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 pub const REPLICATES: u64 = 32;
 
 /// Rays per batch.
-const BATCH: u32 = 1024;
+const BATCH: u64 = 1024;
 
 /// How many rays to cast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,16 +48,18 @@ pub struct RayCastFactors {
 /// of its own).
 pub fn ray_cast(world: &World, patches: &Patches, config: &RayCastConfig) -> RayCastFactors {
     let len = patches.len();
-    let rows: Vec<(Vec<f64>, Vec<f64>)> = (0..len)
-        .into_par_iter()
-        .map(|i| ray_cast_row(world, patches, PatchId::new(i), config))
-        .collect();
-    let mut factors = Vec::with_capacity(len * len);
-    let mut standard_error = Vec::with_capacity(len * len);
-    for (row, error) in rows {
-        factors.extend(row);
-        standard_error.extend(error);
-    }
+    let mut factors = vec![0.0; len * len];
+    let mut standard_error = vec![0.0; len * len];
+    factors
+        .par_chunks_mut(len.max(1))
+        .zip(standard_error.par_chunks_mut(len.max(1)))
+        .enumerate()
+        .for_each_init(
+            || Counts::new(len),
+            |counts, (i, (row, errors))| {
+                counts.fill_row(world, patches, PatchId::new(i), config, row, errors);
+            },
+        );
     RayCastFactors {
         len,
         factors,
@@ -72,65 +74,96 @@ pub fn ray_cast_row(
     patch: PatchId,
     config: &RayCastConfig,
 ) -> (Vec<f64>, Vec<f64>) {
-    let per_replicate = (config.rays as u64).div_ceil(REPLICATES).max(1) as u32;
-    let counts: Vec<Vec<u32>> = (0..REPLICATES)
-        .into_par_iter()
-        .map(|replicate| {
-            let item = (replicate << 32) | u64::from(patch.0);
-            let sequence = Sequence::new(config.seed, Stage::FORM_FACTORS, item);
-            count_hits(world, patches, patch, sequence, per_replicate)
-        })
-        .collect();
-    let mut sum = vec![0.0; patches.len()];
-    let mut square = vec![0.0; patches.len()];
-    for counts in &counts {
-        for (j, &count) in counts.iter().enumerate() {
-            let fraction = f64::from(count) / f64::from(per_replicate);
-            sum[j] += fraction;
-            square[j] += fraction * fraction;
+    let len = patches.len();
+    let (mut row, mut errors) = (vec![0.0; len], vec![0.0; len]);
+    Counts::new(len).fill_row(world, patches, patch, config, &mut row, &mut errors);
+    (row, errors)
+}
+
+/// Scratch space for rows one after another.
+struct Counts {
+    /// Rays of one replicate that met each patch.
+    counts: Vec<u32>,
+    /// The patches that any of them met.
+    met: Vec<PatchId>,
+}
+
+impl Counts {
+    fn new(patches: usize) -> Self {
+        Self {
+            counts: vec![0; patches],
+            met: Vec::new(),
         }
     }
-    let n = REPLICATES as f64;
-    let mean: Vec<f64> = sum.iter().map(|s| s / n).collect();
-    let error = mean
-        .iter()
-        .zip(&square)
-        .map(|(mean, square)| ((square / n - mean * mean).max(0.0) / (n - 1.0)).sqrt())
-        .collect();
-    (mean, error)
+
+    /// Computes a row, which must be zero before, and its standard errors.
+    fn fill_row(
+        &mut self,
+        world: &World,
+        patches: &Patches,
+        patch: PatchId,
+        config: &RayCastConfig,
+        row: &mut [f64],
+        errors: &mut [f64],
+    ) {
+        let rays = (config.rays as u64).div_ceil(REPLICATES).max(1) as u32;
+        let sequences: Vec<Sequence> = (0..REPLICATES)
+            .map(|replicate| {
+                let item = (replicate << 32) | u64::from(patch.0);
+                Sequence::new(config.seed, Stage::FORM_FACTORS, item)
+            })
+            .collect();
+        let mut current = 0;
+        cast(world, patches, patch, &sequences, rays, |replicate, met| {
+            if replicate != current {
+                self.add_replicate(rays, row, errors);
+                current = replicate;
+            }
+            let count = &mut self.counts[met.index()];
+            if *count == 0 {
+                self.met.push(met);
+            }
+            *count += 1;
+        });
+        self.add_replicate(rays, row, errors);
+        // Sums over replicates become the mean and its standard error.
+        let n = REPLICATES as f64;
+        for (factor, error) in row.iter_mut().zip(errors) {
+            *factor /= n;
+            let variance = (*error / n - *factor * *factor).max(0.0) / (n - 1.0);
+            *error = variance.sqrt();
+        }
+    }
+
+    /// Adds the fractions that a replicate found, and their squares.
+    fn add_replicate(&mut self, rays: u32, sums: &mut [f64], squares: &mut [f64]) {
+        for met in self.met.drain(..) {
+            let count = std::mem::take(&mut self.counts[met.index()]);
+            let fraction = f64::from(count) / f64::from(rays);
+            sums[met.index()] += fraction;
+            squares[met.index()] += fraction * fraction;
+        }
+    }
 }
 
-/// How many of the first `rays` rays of a sequence from a patch meet each patch.
-fn count_hits(
-    world: &World,
-    patches: &Patches,
-    patch: PatchId,
-    sequence: Sequence,
-    rays: u32,
-) -> Vec<u32> {
-    let mut counts = vec![0; patches.len()];
-    cast(world, patches, patch, sequence, rays, |met| {
-        counts[met.index()] += 1;
-    });
-    counts
-}
-
-/// Calls `visit` with the patch that each of the first `rays` rays of a sequence from a patch meets, in
-/// the order of the sequence; rays that meet none are left out.
+/// Calls `visit` with the patch that each of the first `rays` rays of some sequences from a patch meets and the
+/// number of the sequence, in their order; rays that meet none are left out.
 pub(super) fn cast(
     world: &World,
     patches: &Patches,
     patch: PatchId,
-    sequence: Sequence,
+    sequences: &[Sequence],
     rays: u32,
-    mut visit: impl FnMut(PatchId),
+    mut visit: impl FnMut(usize, PatchId),
 ) {
-    let mut batch = Vec::with_capacity(BATCH as usize);
     let mut hits = Vec::new();
-    for first in (0..rays).step_by(BATCH as usize) {
+    let all = sequences.len() as u64 * u64::from(rays);
+    let mut batch = Vec::with_capacity(all.min(BATCH) as usize);
+    for first in (0..all).step_by(BATCH as usize) {
         batch.clear();
-        for index in first..rays.min(first + BATCH) {
-            let [x, y, u, v] = sequence.point4(index);
+        for ray in first..all.min(first + BATCH) {
+            let (sequence, index) = (ray / u64::from(rays), ray % u64::from(rays));
+            let [x, y, u, v] = sequences[sequence as usize].point4(index as u32);
             let point = patches.sample(world.surfaces().geometry(), patch, [x, y]);
             let frame = sampling::Frame::around(point.normal.as_vec3());
             let local = cosine_hemisphere::sample([u as f32, v as f32]);
@@ -138,9 +171,9 @@ pub(super) fn cast(
         }
         hits.resize(batch.len(), Hit::MISS);
         world.bvh().closest_hits(&batch, &mut hits);
-        for (ray, hit) in batch.iter().zip(&hits) {
+        for ((ray, hit), index) in batch.iter().zip(&hits).zip(first..) {
             if let Some(met) = world.patch_hit(patches, ray, hit) {
-                visit(met);
+                visit((index / u64::from(rays)) as usize, met);
             }
         }
     }

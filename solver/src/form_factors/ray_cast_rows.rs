@@ -40,7 +40,7 @@ pub fn ray_cast_rows(world: &World, patches: &Patches, config: &RayCastRowsConfi
             let sequence = Sequence::new(config.seed, Stage::FORM_FACTORS, item);
             let mut row = Vec::with_capacity(config.rays as usize);
             let patch = PatchId::new(i);
-            cast(world, patches, patch, sequence, config.rays, |met| {
+            cast(world, patches, patch, &[sequence], config.rays, |_, met| {
                 row.push(met.0);
             });
             row

@@ -64,34 +64,31 @@ fn hemicube_rows<'a>(
     patch: impl Fn(usize) -> &'a [Polygon] + Sync,
 ) -> Dense {
     let prototype = Hemicube::new(config.resolution);
-    let rows: Vec<Vec<f64>> = (0..n)
-        .into_par_iter()
-        .map_init(
-            || prototype.clone(),
-            |cube, i| {
-                let mut row = vec![0.0; n];
-                let mut turn = 0.0;
-                let area: f64 = patch(i).iter().map(Polygon::area).sum();
-                for polygon in patch(i) {
-                    // An origin lies on its own polygon up to rounding: seen from 1e-17 behind, that
-                    // would hide everything.
-                    let others: Vec<Facet> = facets
-                        .iter()
-                        .filter(|facet| facet.vertices != polygon.vertices())
-                        .copied()
-                        .collect();
-                    for (origin, share) in origins(polygon, config.origins) {
-                        turn = (turn + GOLDEN) % 1.0;
-                        let angle = turn * FRAC_PI_2;
-                        let weight = share * polygon.area() / area;
-                        cube.add(origin, polygon.normal(), angle, &others, weight, &mut row);
-                    }
+    let mut entries = vec![0.0; n * n];
+    let rows = entries.par_chunks_mut(n.max(1)).enumerate();
+    rows.for_each_init(
+        || prototype.clone(),
+        |cube, (i, row)| {
+            let mut turn = 0.0;
+            let area: f64 = patch(i).iter().map(Polygon::area).sum();
+            for polygon in patch(i) {
+                // An origin lies on its own polygon up to rounding: seen from 1e-17 behind, that
+                // would hide everything.
+                let others: Vec<Facet> = facets
+                    .iter()
+                    .filter(|facet| facet.vertices != polygon.vertices())
+                    .copied()
+                    .collect();
+                for (origin, share) in origins(polygon, config.origins) {
+                    turn = (turn + GOLDEN) % 1.0;
+                    let angle = turn * FRAC_PI_2;
+                    let weight = share * polygon.area() / area;
+                    cube.add(origin, polygon.normal(), angle, &others, weight, row);
                 }
-                row
-            },
-        )
-        .collect();
-    Dense::new(n, rows.concat()).expect("pixel form factors are finite and not negative")
+            }
+        },
+    );
+    Dense::new(n, entries).expect("pixel form factors are finite and not negative")
 }
 
 /// Origins on a patch and their shares; a single one is the centre.
