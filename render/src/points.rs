@@ -10,6 +10,7 @@ mod results;
 use csv::StringRecord;
 use glam::DVec3;
 use luxel_scenes::Rgb;
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// A place and an orientation.
@@ -174,25 +175,45 @@ impl PointTable {
         let kept: Vec<usize> = (0..self.header.len())
             .filter(|&column| !OUTPUT.contains(&self.header[column].trim()))
             .collect();
-        let mut writer = csv::Writer::from_writer(Vec::new());
+        let mut header = csv::Writer::from_writer(Vec::new());
         let names = kept.iter().map(|&column| &self.header[column]);
-        writer.write_record(names.chain(OUTPUT))?;
-        for (record, estimate) in self.records.iter().zip(estimates) {
-            for &column in &kept {
-                writer.write_field(&record[column])?;
-            }
-            let numbers = [estimate.value, estimate.standard_error];
-            writer.write_record(
-                numbers
-                    .iter()
-                    .flat_map(Rgb::to_array)
-                    .map(|number| number.to_string()),
-            )?;
-        }
-        Ok(writer
+        header.write_record(names.chain(OUTPUT))?;
+        let records = self.records.par_chunks(LINES_AT_ONCE);
+        let lines = records
+            .zip(estimates.par_chunks(LINES_AT_ONCE))
+            .map(|(records, estimates)| lines(records, &kept, estimates))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut table = header
             .into_inner()
-            .map_err(csv::IntoInnerError::into_error)?)
+            .map_err(csv::IntoInnerError::into_error)?;
+        for mut part in lines {
+            table.append(&mut part);
+        }
+        Ok(table)
     }
+}
+
+/// Lines that one thread writes at a time.
+const LINES_AT_ONCE: usize = 4096;
+
+/// Some columns of records, and the estimates, as lines of a table.
+fn lines(
+    records: &[StringRecord],
+    kept: &[usize],
+    estimates: &[Estimate],
+) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for (record, estimate) in records.iter().zip(estimates) {
+        for &column in kept {
+            writer.write_field(&record[column])?;
+        }
+        let numbers = [estimate.value, estimate.standard_error];
+        let numbers = numbers.iter().flat_map(Rgb::to_array);
+        writer.write_record(numbers.map(|number| number.to_string()))?;
+    }
+    Ok(writer
+        .into_inner()
+        .map_err(csv::IntoInnerError::into_error)?)
 }
 
 fn parse_point(

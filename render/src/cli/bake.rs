@@ -52,7 +52,8 @@ pub(super) struct Bake {
     #[serde(skip)]
     output: PathBuf,
 
-    /// Go on from the checkpoint in the folder, if there is one, to what would have come out without the interruption
+    /// Go on from the checkpoint in the folder, if there is one, to what would have come out without the interruption; of maps of
+    /// directions, volumes and masks there is none, they are begun anew
     #[arg(long)]
     #[serde(skip)]
     resume: bool,

@@ -224,6 +224,9 @@ impl<'a, 'r> Keeper<'a, 'r> {
                 "{} is of work that was not finished: it will be replaced; with --resume that work would go on",
                 path.display()
             )),
+            (Resume::GoOn, false) if self.folder.path().join(name_of(0)).exists() => {
+                reporter.note(format_args!("going on after the maps that are complete"));
+            }
             (Resume::GoOn, false) => reporter.note(format_args!(
                 "there is no {}: the work begins from the start",
                 path.display()

@@ -160,7 +160,7 @@ impl Probe {
             memory::peak_in_words(),
             error.summary(goal)
         ));
-        let csv = table.to_csv(&estimates)?;
+        let csv = context.common.install(|| table.to_csv(&estimates))??;
         if let Some(output) = &output {
             output.write(&csv)?;
         }

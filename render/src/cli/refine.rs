@@ -48,6 +48,11 @@ impl Refined<'_> {
             round: Cow::Owned(round),
         }
     }
+
+    /// Whether it can be of so many receivers, one pixel each.
+    pub(super) fn is_of(&self, receivers: usize) -> bool {
+        self.film.size() == [receivers, 1] && self.round.further.len() == receivers
+    }
 }
 
 /// A round of exposure.

@@ -278,6 +278,7 @@ fn refine(
         // A new mesh begins a new gather: only where rays cannot make up for the old one.
         let fixed = result.parts.solution.hypot(result.parts.mesh);
         let mut solved = None;
+        let mut is_stopped = false;
         if let Some(scene) = adapted.filter(|_| fixed > MESH_SHARE * error) {
             let free = spent.plan(error, count, Changes::All);
             let worthwhile = (WORTHWHILE * before.patches as f64) as usize;
@@ -295,6 +296,7 @@ fn refine(
                 solved = scene
                     .solve(patches, control)?
                     .map(|lookup| (lookup, patches));
+                is_stopped = solved.is_none();
             }
         }
         let rays = next
@@ -304,7 +306,9 @@ fn refine(
         let shadow_rounds = spent.penumbrae.due(&next.shadow_rays);
         let is_futile = rays == before.rays && solved.is_none() && shadow_rounds.is_empty();
         if is_futile || gathering.round.before == MAX_ROUNDS {
-            result.ending = if gathering.round.is_held_back {
+            result.ending = if is_stopped {
+                Ending::Stopped
+            } else if gathering.round.is_held_back {
                 Ending::TooManyPatches
             } else {
                 Ending::OutOfReach

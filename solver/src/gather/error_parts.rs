@@ -13,7 +13,7 @@
 //! comes from the same gathers: 5.4 and 8.2 % of the runs exceed the bound, not 5 %. Valid for errors near a
 //! normal distribution. Cost: O(n).
 
-use super::tally::{Gathered, Scatters, Tally};
+use super::tally::{Scatters, Tally, means};
 use crate::error::discretisation;
 
 /// Parts of a relative error, each the root mean square over all receivers and channels over their
@@ -68,7 +68,7 @@ impl ErrorParts {
 /// Relative errors of all receivers together. The scatters are averaged as they are: their mean is
 /// unbiased, that of moderated ones, each on the safe side, would not be.
 pub fn error_parts(tallies: &[Tally]) -> ErrorParts {
-    let gathered: Vec<Gathered> = tallies.iter().map(Tally::means).collect();
+    let gathered = means(tallies);
     let mut level = 0.0;
     let mut squares = [0.0; 4];
     // By receiver: its channels share their rays.

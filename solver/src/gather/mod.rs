@@ -150,7 +150,8 @@ pub fn gather(
     let rays_find_direct = lights.has_unlisted_emission() || lights.has_sky() && !sky_is_apart;
     let follows = wants_indirect || config.rays > 0 && rays_find_direct;
     let wants_direct = config.components != Components::Indirect;
-    let chunk = (RAYS_PER_TASK / config.rays.max(1)).clamp(1, 256);
+    let rays = config.rays.max(config.shadow_rays);
+    let chunk = (RAYS_PER_TASK / rays.max(1)).clamp(1, 256);
     receivers
         .par_chunks(chunk)
         .zip(keys.par_chunks(chunk))

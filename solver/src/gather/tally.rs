@@ -18,6 +18,7 @@
 use super::lookup::{MAX_REPLICATES, PerSolution};
 use crate::error::{discretisation, moderate};
 use luxel_scenes::{Irradiance, Rgb};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Exponent with which the noise of direct light falls with its shadow rays, measured on the reference scenes
@@ -206,9 +207,18 @@ impl Tally {
     }
 }
 
+/// Tallies that one thread takes at a time.
+const AT_ONCE: usize = 1024;
+
+/// The means of all tallies, without errors.
+pub(super) fn means(tallies: &[Tally]) -> Vec<Gathered> {
+    let all = tallies.par_iter().with_min_len(AT_ONCE);
+    all.map(Tally::means).collect()
+}
+
 /// Values with their errors, moderated over all the tallies.
 pub fn finish(tallies: &[Tally]) -> Vec<Gathered> {
-    let mut gathered: Vec<Gathered> = tallies.iter().map(Tally::means).collect();
+    let mut gathered = means(tallies);
     for channel in 0..3 {
         let [direct, gather, solution, mesh] =
             Scatters::new(tallies, &gathered, channel).moderated();
@@ -240,11 +250,9 @@ impl Scatters {
     pub(super) fn new(tallies: &[Tally], gathered: &[Gathered], channel: usize) -> Self {
         let gathers = tallies.first().map_or(0, |tally| tally.gathers);
         let solutions = tallies.iter().map(|t| t.solutions).max().unwrap_or(0);
-        let by = |value: &dyn Fn(&Tally, &Gathered) -> f64| -> Vec<f64> {
-            tallies
-                .iter()
-                .zip(gathered)
-                .map(|(tally, gathered)| value(tally, gathered))
+        let by = |value: &(dyn Fn(&Tally, &Gathered) -> f64 + Sync)| -> Vec<f64> {
+            let all = tallies.par_iter().zip(gathered).with_min_len(AT_ONCE);
+            all.map(|(tally, gathered)| value(tally, gathered))
                 .collect()
         };
         let count = |tally: &Tally| f64::from(tally.rays.max(1)) * f64::from(gathers.max(1));
@@ -271,7 +279,8 @@ impl Scatters {
             }),
             indirect_level: by(&|_, gathered| gathered.indirect.0[channel].powi(2)),
             differences: tallies
-                .iter()
+                .par_iter()
+                .with_min_len(AT_ONCE)
                 .map(|tally| {
                     let noise =
                         scatter(&tally.difference, solutions, channel) / count(tally).powi(2);

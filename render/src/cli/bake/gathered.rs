@@ -138,7 +138,7 @@ fn sampled(
     let context = keeper.context();
     let mut steering = Steering::new(context, Some(goal)).keeping(keeper);
     let start = match keeper.current() {
-        Some(Current::Film(refined)) => refined,
+        Some(Current::Film(refined)) if refined.is_of(receivers) => refined,
         _ => Refined::first(Film::new([receivers, 1], MAX_REPLICATES as u32), first),
     };
     let (film, error) = refine(start, Alike::Values, Some(goal), &mut steering, add)?;
