@@ -11,15 +11,19 @@ const KILLS: usize = 20;
 const CHAIN: usize = 4;
 
 /// Long enough for some rounds, short enough to be done again and again.
-const OPTIONS: [&str; 8] = [
+const OPTIONS: [&str; 12] = [
     "--size",
     "48",
     "--error",
     "1.5%",
     "--include",
-    "all,ao",
+    "all,ao,masks",
     "--max-distance",
     "0.3",
+    "--directional",
+    "sh1",
+    "--volume-probes",
+    "2x2x2",
 ];
 
 fn scene() -> PathBuf {
@@ -57,6 +61,16 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
+fn has_checkpoint(folder: &Path) -> bool {
+    let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.any(|entry| {
+        entry
+            .file_name()
+            .to_string_lossy()
+            .starts_with("checkpoint")
+    })
+}
+
 /// Weyl's sequence: evenly spread moments.
 fn moment(index: usize, whole: Duration) -> Duration {
     whole.mul_f64((index as f64 * 0.618_033_988_749_894_9).fract())
@@ -87,7 +101,7 @@ fn killed_at_any_moment_a_bake_goes_on_to_the_same_bytes() {
         for link in 0..CHAIN {
             let child = bake(&disturbed, &["--resume"]).spawn().expect("it runs");
             kill_after(child, moment(chain * CHAIN + link, whole));
-            resumed += usize::from(disturbed.join("checkpoint.luxel").exists());
+            resumed += usize::from(has_checkpoint(&disturbed));
             if disturbed.exists() {
                 // What has its final name is whole.
                 for (name, content) in files(&disturbed) {

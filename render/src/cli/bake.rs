@@ -52,8 +52,7 @@ pub(super) struct Bake {
     #[serde(skip)]
     output: PathBuf,
 
-    /// Go on from the checkpoint in the folder, if there is one, to what would have come out without the interruption; of maps of
-    /// directions, volumes and masks there is none, they are begun anew
+    /// Go on from the checkpoint in the folder, if there is one, to what would have come out without the interruption
     #[arg(long)]
     #[serde(skip)]
     resume: bool,

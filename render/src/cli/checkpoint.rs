@@ -2,7 +2,8 @@
 //!
 //! A file holds the name of the format, a line of JSON with the [`Identity`] of the work, what was found so far, and a
 //! checksum. It is written whole or not at all, every so often and when the user stops the work; each set of maps that is complete
-//! while more are to come has a file of its own, so that it need not be held in memory. Scene, atlas, meshes and
+//! while more are to come has a file of its own, so that it need not be held in memory, and so have maps of directions, masks and
+//! volumes, of which nothing is kept before they are complete. Scene, atlas, meshes and
 //! solutions are made anew from the same input: what goes on from a checkpoint ends with the same bytes as what was never
 //! interrupted.
 
@@ -273,10 +274,38 @@ impl<'a, 'r> Keeper<'a, 'r> {
         None
     }
 
-    /// What is worked on is complete, and more will follow.
+    /// The set of maps that is worked on is complete, and more will follow.
     pub(super) fn keep_complete(&self, maps: &AtLuxels) {
-        if self.context.started.elapsed() >= self.every {
-            self.try_to_write(&name_of(self.index.get()), maps);
+        self.keep_whole(&name_of(self.index.get()), maps);
+    }
+
+    /// Work of which nothing is kept before it is complete: it is taken up where the folder has it, and else done. `name`
+    /// tells it from other such work.
+    ///
+    /// # Errors
+    /// Those of the work, and when its file is broken or of other work.
+    pub(super) fn whole<T: Serialize + DeserializeOwned>(
+        &self,
+        name: &str,
+        work: impl FnOnce() -> Result<Option<T>, Failure>,
+    ) -> Result<Option<T>, Failure> {
+        let name = format!("checkpoint_{name}.luxel");
+        let path = self.folder.path().join(&name);
+        if self.resume.get() == Resume::GoOn && path.exists() {
+            return self.read(&path).map(Some);
+        }
+        let done = work()?;
+        if let Some(done) = &done {
+            self.keep_whole(&name, done);
+        }
+        Ok(done)
+    }
+
+    /// Keeps what is complete, unless it took no time or is what there was when the user stopped the work.
+    fn keep_whole(&self, name: &str, done: &impl Serialize) {
+        let context = self.context;
+        if context.started.elapsed() >= self.every && !context.interrupt.is_set() {
+            self.try_to_write(name, done);
         }
     }
 

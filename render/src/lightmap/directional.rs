@@ -92,6 +92,7 @@ pub fn bytes_for(texels: usize) -> usize {
 }
 
 /// Maps by texel, in the unit of irradiance.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Directions {
     /// a₀ and the three of a along x, y and z.
     pub coefficients: [Vec<Rgb>; COEFFICIENTS],

@@ -21,9 +21,10 @@ use luxel_solver::gather::Components;
 use luxel_solver::incident::Aim;
 use luxel_solver::world::World;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// What maps of light say of its directions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Directional {
     /// Nothing
@@ -35,6 +36,7 @@ pub(super) enum Directional {
 }
 
 /// Maps of directions with their error.
+#[derive(Serialize, Deserialize)]
 pub(super) struct DirectionalMaps {
     kind: Directional,
     maps: Directions,

@@ -6,6 +6,7 @@
 
 use super::Bake;
 use crate::cli::Context;
+use crate::cli::checkpoint::Keeper;
 use crate::cli::exit::Failure;
 use crate::cli::goal::Goal;
 use crate::cli::stated::StatedError;
@@ -47,8 +48,9 @@ impl Bake {
         luxels: &Luxels,
         lights: Vec<NamedLight>,
         goal: &Goal,
-        context: &Context<'_>,
+        keeper: &Keeper<'_, '_>,
     ) -> Result<Option<Vec<Masked>>, Failure> {
+        let context = keeper.context();
         if !lights.is_empty() && world.lights().has_unlisted_emission() {
             context.reporter.note(
                 "masks: emission from textures, or of more polygons than are sources, is in no mask",
@@ -58,7 +60,8 @@ impl Bake {
         for (index, light) in (0..).zip(lights) {
             let lit = world.lit_by(world.lights().only(&light.sources));
             let seed = hash::mix64(context.common.seed ^ hash::mix64(MASK + index));
-            let Some(visible) = visible(&lit, luxels, seed, goal, context)? else {
+            let work = || visible(&lit, luxels, seed, goal, context);
+            let Some(visible) = keeper.whole(&format!("mask_{index}"), work)? else {
                 return Ok(None);
             };
             let maps = bake::finish(world, atlas, luxels, &visible, self.smoothing());

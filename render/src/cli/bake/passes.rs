@@ -145,6 +145,10 @@ impl Bake {
                 return Ok(None);
             };
             let mut layer = self.layer(world, &atlas, &luxels, include, &gathered);
+            if passes > 1 || !masked.is_empty() {
+                keeper.keep_complete(&gathered);
+            }
+            drop(gathered);
             if self.directional != Directional::None
                 && let Some(light) = include.components()
             {
@@ -157,16 +161,15 @@ impl Bake {
                     bounces: self.reflections.bounces(),
                     patches: self.patches(&layer, goal),
                 };
-                let found = self.directions(&pass, &atlas, &luxels, &layer)?;
+                let name = format!("{}_directions", layers.len());
+                let work = || self.directions(&pass, &atlas, &luxels, &layer);
+                let found = keeper.whole(&name, work)?;
                 if found.is_none() {
                     return Ok(None);
                 }
                 layer.directional = found;
             }
             layers.push(layer);
-            if layers.len() < self.include.len() && !context.interrupt.is_set() {
-                keeper.keep_complete(&gathered);
-            }
         }
         let mut volume = None;
         if let Some(grid) = grid {
@@ -184,12 +187,12 @@ impl Bake {
                 bounces: self.reflections.bounces(),
                 patches: self.patches(layer, goal),
             };
-            volume = self.volume(&pass, grid, &include)?;
+            volume = keeper.whole("volume", || self.volume(&pass, grid, &include))?;
             if volume.is_none() {
                 return Ok(None);
             }
         }
-        let Some(masks) = self.masks(world, &atlas, &luxels, masked, goal, context)? else {
+        let Some(masks) = self.masks(world, &atlas, &luxels, masked, goal, keeper)? else {
             return Ok(None);
         };
         Ok(Some(Baked {

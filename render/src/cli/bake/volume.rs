@@ -35,6 +35,7 @@ pub(super) struct VolumeOptions {
 }
 
 /// A finished volume, as it is written.
+#[derive(serde::Serialize, serde::Deserialize)]
 pub(super) struct BakedVolume {
     header: Header,
     data: Vec<u8>,
