@@ -6,6 +6,7 @@
 //! everything as one HTML file, [`table`] as CSV. Rows depend on the input and the seed alone; how many
 //! there are depends on the clock, unless their number is given.
 
+mod axis;
 pub mod budget;
 pub mod checks;
 mod classical;
@@ -18,6 +19,7 @@ mod measure;
 mod memory;
 mod methods;
 pub mod metrics;
+mod numbers;
 mod operators;
 pub mod order;
 pub mod page;

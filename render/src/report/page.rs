@@ -13,9 +13,11 @@ mod pictures;
 mod setup;
 mod solvers;
 
+use super::axis::{Axis, Spacing};
 use super::html::{concat, escape};
+use super::numbers::{percent, plain};
 use super::palette::of_family;
-use super::plot::{self, Axis, Chart, Dot, Series, Spacing, percent, plain};
+use super::plot::{self, Chart, Dot, Series};
 use super::study::{FamilyResult, Row, Study};
 use super::table;
 use std::fmt::Write as _;

@@ -4,8 +4,8 @@
 //! labelled at their ends, in the right margin; labels that would overlap are moved apart, with a thin
 //! line to their mark.
 
+use super::axis::{Axis, Spacing, Span};
 use super::palette::Mark;
-use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use plotters::element::{Circle, PathElement, Polygon, Rectangle, Text};
 use plotters::prelude::{
     ChartBuilder, DashedLineSeries, DrawingArea, DrawingAreaErrorKind, IntoDrawingArea, LineSeries,
@@ -48,21 +48,6 @@ pub(super) struct Series {
     pub(super) is_dashed: bool,
 }
 
-/// How an axis maps values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Spacing {
-    Linear,
-    Logarithmic,
-}
-
-/// An axis.
-#[derive(Clone, Copy)]
-pub(super) struct Axis {
-    pub(super) label: &'static str,
-    pub(super) spacing: Spacing,
-    pub(super) format: fn(f64) -> String,
-}
-
 /// A chart of lines.
 pub(super) struct Chart {
     /// Read by those who cannot see it.
@@ -73,113 +58,6 @@ pub(super) struct Chart {
     pub(super) series: Vec<Series>,
     /// Draws the line y = x.
     pub(super) has_diagonal: bool,
-}
-
-/// A range of values on an axis.
-#[derive(Clone, Copy, Debug)]
-struct Span {
-    low: f64,
-    high: f64,
-    spacing: Spacing,
-    format: fn(f64) -> String,
-}
-
-impl Span {
-    /// Covers the values, with a margin.
-    fn over(values: impl Iterator<Item = f64>, axis: &Axis) -> Option<Self> {
-        let is_shown = |v: &f64| v.is_finite() && (axis.spacing == Spacing::Linear || *v > 0.0);
-        let (low, high) = values
-            .filter(is_shown)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-                (low.min(v), high.max(v))
-            });
-        if low > high {
-            return None;
-        }
-        let (low, high) = match axis.spacing {
-            Spacing::Linear => {
-                let margin = 0.04 * (high - low).max(1e-9 * high.abs()).max(f64::MIN_POSITIVE);
-                (low - margin, high + margin)
-            }
-            Spacing::Logarithmic => (low / 1.35, high * 1.35),
-        };
-        Some(Self {
-            low,
-            high,
-            spacing: axis.spacing,
-            format: axis.format,
-        })
-    }
-
-    /// Values with a grid line and a number.
-    fn ticks(&self, most: usize) -> Vec<f64> {
-        match self.spacing {
-            Spacing::Linear => {
-                let rough = (self.high - self.low) / most.max(2) as f64;
-                let decade = 10_f64.powf(rough.log10().floor());
-                let step = [1.0, 2.0, 5.0, 10.0]
-                    .into_iter()
-                    .map(|s| s * decade)
-                    .find(|&s| s >= rough)
-                    .unwrap_or(10.0 * decade);
-                let first = (self.low / step).ceil() as i64;
-                let last = (self.high / step).floor() as i64;
-                (first..=last).map(|k| k as f64 * step).collect()
-            }
-            Spacing::Logarithmic => {
-                let decades = (self.high / self.low).log10();
-                let steps: &[f64] = if decades < 1.0 {
-                    &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0]
-                } else if decades < 3.0 {
-                    &[1.0, 2.0, 5.0]
-                } else {
-                    &[1.0]
-                };
-                let skip = ((decades / most.max(2) as f64).ceil() as i32).max(1);
-                let [first, last] = [self.low, self.high].map(|v| v.log10().floor() as i32);
-                (first..=last)
-                    .filter(|k| k.rem_euclid(skip) == 0)
-                    .flat_map(|k| steps.iter().map(move |s| s * 10_f64.powi(k)))
-                    .filter(|v| (self.low..=self.high).contains(v))
-                    .collect()
-            }
-        }
-    }
-}
-
-impl Ranged for Span {
-    type FormatOption = NoDefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        let share = match self.spacing {
-            Spacing::Linear => (value - self.low) / (self.high - self.low),
-            Spacing::Logarithmic => {
-                (value.max(f64::MIN_POSITIVE) / self.low).ln() / (self.high / self.low).ln()
-            }
-        };
-        // Far outside is as good as a little outside, and fits an i32.
-        let share = share.clamp(-10.0, 10.0);
-        limit.0 + (share * f64::from(limit.1 - limit.0)).round() as i32
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        self.ticks(hint.max_num_points().min(8))
-    }
-
-    fn range(&self) -> Range<f64> {
-        self.low..self.high
-    }
-}
-
-impl ValueFormatter<f64> for Span {
-    fn format(value: &f64) -> String {
-        value.to_string()
-    }
-
-    fn format_ext(&self, value: &f64) -> String {
-        (self.format)(*value)
-    }
 }
 
 /// Text of `size` shown pixels.
@@ -449,59 +327,9 @@ pub(super) fn bars(bars: &[Bar], description: &str, margins: [u32; 2]) -> String
     })
 }
 
-/// A number with as many digits as it needs: 0.05, 200, 10⁶.
-pub(super) fn plain(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let exponent = value.abs().log10().floor() as i32;
-    if (-3..=4).contains(&exponent) {
-        let digits = usize::try_from(1 - exponent).unwrap_or(0);
-        let text = format!("{value:.digits$}");
-        return if text.contains('.') {
-            text.trim_end_matches('0').trim_end_matches('.').to_owned()
-        } else {
-            text
-        };
-    }
-    // Two digits, so that 9.96 becomes the next power and not ten times this one.
-    let mantissa = (value / 10_f64.powi(exponent) * 10.0).round() / 10.0;
-    let (mantissa, exponent) = if mantissa.abs() >= 10.0 {
-        (mantissa / 10.0, exponent + 1)
-    } else {
-        (mantissa, exponent)
-    };
-    let power: String = exponent.to_string().chars().map(superscript).collect();
-    if (mantissa - 1.0).abs() < 1e-6 {
-        format!("10{power}")
-    } else {
-        format!("{}·10{power}", plain(mantissa))
-    }
-}
-
-/// A ratio in per cent.
-pub(super) fn percent(value: f64) -> String {
-    format!("{} %", plain(100.0 * value))
-}
-
-fn superscript(character: char) -> char {
-    match character {
-        '-' => '⁻',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        '4' => '⁴',
-        '5' => '⁵',
-        '6' => '⁶',
-        '7' => '⁷',
-        '8' => '⁸',
-        '9' => '⁹',
-        _ => '⁰',
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::numbers::plain;
     use super::*;
 
     const LOG: Axis = Axis {
@@ -509,32 +337,6 @@ mod tests {
         spacing: Spacing::Logarithmic,
         format: plain,
     };
-
-    #[test]
-    fn numbers_have_the_digits_they_need() {
-        for (value, expected) in [
-            (0.0, "0"),
-            (0.05, "0.05"),
-            (1.5, "1.5"),
-            (200.0, "200"),
-            (1e6, "10⁶"),
-            (2e-5, "2·10⁻⁵"),
-            (9.98e-6, "10⁻⁵"),
-            (1.04e6, "10⁶"),
-        ] {
-            assert_eq!(plain(value), expected);
-        }
-        assert_eq!(percent(0.015), "1.5 %");
-    }
-
-    #[test]
-    fn ticks_of_logarithmic_axes_are_round() {
-        let span = |values: [f64; 2]| Span::over(values.into_iter(), &LOG).expect("values");
-        assert_eq!(span([0.2, 3.0]).ticks(8), [0.2, 0.5, 1.0, 2.0]);
-        assert_eq!(span([1.0, 1e5]).ticks(8), [1.0, 10.0, 100.0, 1e3, 1e4, 1e5]);
-        assert!(span([1e-14, 1.0]).ticks(6).len() <= 6);
-        assert!(Span::over([0.0, -1.0].into_iter(), &LOG).is_none());
-    }
 
     #[test]
     fn a_chart_is_svg_with_escaped_text() {

@@ -1,6 +1,7 @@
 //! The patch mesher: from faces to patches of about one size.
 
-use super::box_tree::bounds_of;
+use super::Patches;
+use super::assemble::{assemble, is_two_sided};
 use super::clipped::Clipped;
 use super::cluster::cluster;
 use super::density::{self, Density};
@@ -9,12 +10,10 @@ use super::quads;
 use super::region::{Region, Shape};
 use super::separation::separate;
 use super::triangle_grid::TriangleGrid;
-use super::{PatchId, Patches, Side};
 use crate::bvh::Bvh;
-use crate::geometry::Geometry;
 use crate::surface::Surfaces;
 use glam::DVec3;
-use luxel_scenes::{Exitance, FaceId, Reflectance, Sidedness};
+use luxel_scenes::FaceId;
 use std::collections::HashSet;
 use thiserror::Error;
 
@@ -124,68 +123,8 @@ impl Patches {
     }
 }
 
-impl Patches {
-    /// The mesh with the marked patches divided: elements of grids in four (and neighbours with them,
-    /// so that elements that share an edge differ by one level at most), clusters into smaller ones,
-    /// and polygons of five and more corners as a whole where half of their area is marked. A patch
-    /// of one side is divided when its other side is.
-    ///
-    /// # Panics
-    /// When there is not one mark per patch.
-    #[must_use]
-    pub fn refined(&self, surfaces: &Surfaces, bvh: &Bvh, marked: &[bool]) -> Self {
-        assert_eq!(marked.len(), self.len(), "one mark for each patch");
-        let geometry = surfaces.geometry();
-        let mesher = Mesher::new(surfaces, bvh, None);
-        let mut regions = Vec::new();
-        for old in &self.regions {
-            let count = old.shape_count();
-            let mut is_marked = vec![false; count as usize];
-            for element in 0..old.element_count() {
-                let firsts = [Some(old.first), old.first_back];
-                is_marked[old.whole(element) as usize] |= firsts
-                    .into_iter()
-                    .flatten()
-                    .any(|first| marked[(first + element) as usize]);
-            }
-            if !is_marked.contains(&true) {
-                regions.push(old.clone());
-                continue;
-            }
-            let is_marked = |element: u32| is_marked[element as usize];
-            let shape = match &old.shape {
-                Shape::Quad(quad) => Shape::Quad(quad.refined(is_marked)),
-                Shape::Triangle(triangle) => Shape::Triangle(triangle.refined(is_marked)),
-                Shape::Clipped(clipped) => {
-                    let area = |wanted: bool| -> f64 {
-                        (0..count)
-                            .filter(|&element| is_marked(element) || !wanted)
-                            .map(|element| old.shape_area(geometry, element))
-                            .sum()
-                    };
-                    if area(true) < 0.5 * area(false) {
-                        old.shape.clone()
-                    } else {
-                        let polygon = geometry.polygon(old.faces[0]);
-                        polygon_shape(&polygon, 0.5 * clipped.cell())
-                    }
-                }
-                Shape::Faces { .. } => {
-                    let size = 0.5 * old.shape_area(geometry, 0).sqrt();
-                    let mut faces = old.faces.clone();
-                    faces.sort_unstable_by_key(|face| face.index());
-                    regions.extend(mesher.divide_faces(&faces, &old.faces, size));
-                    continue;
-                }
-            };
-            regions.push(region(shape, old.faces.clone()));
-        }
-        separated(surfaces, bvh, regions)
-    }
-}
-
 /// The patches of regions, with their elements divided where walls separate parts of them.
-fn separated(surfaces: &Surfaces, bvh: &Bvh, mut regions: Vec<Region>) -> Patches {
+pub(super) fn separated(surfaces: &Surfaces, bvh: &Bvh, mut regions: Vec<Region>) -> Patches {
     separate(surfaces, bvh, &mut regions);
     assemble(surfaces, regions, false)
 }
@@ -205,7 +144,7 @@ fn objects(surfaces: &Surfaces, areas: &[f64]) -> Vec<Region> {
 }
 
 /// What regions are made from.
-struct Mesher<'m, 's> {
+pub(super) struct Mesher<'m, 's> {
     surfaces: &'m Surfaces<'s>,
     bvh: &'m Bvh,
     /// Of each face.
@@ -216,7 +155,11 @@ struct Mesher<'m, 's> {
 }
 
 impl<'m, 's> Mesher<'m, 's> {
-    fn new(surfaces: &'m Surfaces<'s>, bvh: &'m Bvh, density: Option<&'m Density>) -> Self {
+    pub(super) fn new(
+        surfaces: &'m Surfaces<'s>,
+        bvh: &'m Bvh,
+        density: Option<&'m Density>,
+    ) -> Self {
         let areas: Vec<f64> = (0..surfaces.geometry().face_count())
             .map(|index| surfaces.area(FaceId::new(index)))
             .collect();
@@ -292,7 +235,12 @@ impl<'m, 's> Mesher<'m, 's> {
     }
 
     /// Cuts some faces into regions; `ordered` are the same faces as neighbours in space.
-    fn divide_faces(&self, faces: &[FaceId], ordered: &[FaceId], size: f64) -> Vec<Region> {
+    pub(super) fn divide_faces(
+        &self,
+        faces: &[FaceId],
+        ordered: &[FaceId],
+        size: f64,
+    ) -> Vec<Region> {
         let geometry = self.surfaces.geometry();
         let is_large = |face: FaceId| {
             self.areas[face.index()] * self.face_density(face) >= LARGE_FACE * size * size
@@ -389,7 +337,7 @@ fn fold([x, y]: [f64; 2]) -> [f64; 2] {
     }
 }
 
-fn region(shape: Shape, faces: Vec<FaceId>) -> Region {
+pub(super) fn region(shape: Shape, faces: Vec<FaceId>) -> Region {
     Region {
         shape,
         faces,
@@ -398,10 +346,6 @@ fn region(shape: Shape, faces: Vec<FaceId>) -> Region {
         first: 0,
         first_back: None,
     }
-}
-
-fn is_two_sided(surfaces: &Surfaces, region: &Region) -> bool {
-    surfaces.material(region.faces[0]).sidedness == Sidedness::Both
 }
 
 /// One patch of whole faces.
@@ -419,114 +363,6 @@ fn single(members: Vec<FaceId>, areas: &[f64]) -> Region {
 }
 
 /// A polygon of five or more corners is covered by the grid of its box in its own plane.
-fn polygon_shape(polygon: &[DVec3], size: f64) -> Shape {
+pub(super) fn polygon_shape(polygon: &[DVec3], size: f64) -> Shape {
     Shape::Clipped(Clipped::new(polygon, size))
-}
-
-/// Numbers the patches and computes what they carry.
-fn assemble(surfaces: &Surfaces, mut regions: Vec<Region>, fronts_only: bool) -> Patches {
-    let geometry = surfaces.geometry();
-    let mut triangle_region = vec![0; geometry.len()];
-    let mut patches = Patches {
-        regions: Vec::new(),
-        triangle_region: Vec::new(),
-        patch_region: Vec::new(),
-        area: Vec::new(),
-        size: Vec::new(),
-        reflectance: Vec::new(),
-        emission: Vec::new(),
-    };
-    for (index, region) in regions.iter_mut().enumerate() {
-        for triangle in region
-            .faces
-            .iter()
-            .flat_map(|&face| geometry.triangles_of(face))
-        {
-            triangle_region[triangle.index()] = index as u32;
-        }
-        let two_sided = !fronts_only && is_two_sided(surfaces, region);
-        region.first = patches.area.len() as u32;
-        let count = region.element_count();
-        region.first_back = two_sided.then_some(region.first + count);
-        for side in [Side::Front, Side::Back] {
-            if side == Side::Back && !two_sided {
-                continue;
-            }
-            for element in 0..count {
-                let area = region.element_area(geometry, element);
-                let size = match region.shape {
-                    Shape::Faces { .. } => {
-                        area.sqrt().max(cluster_extent(geometry, region, element))
-                    }
-                    _ => area.sqrt(),
-                };
-                let (reflectance, emission) = mean_material(surfaces, region, element, side);
-                patches.patch_region.push(index as u32);
-                patches.area.push(area);
-                patches.size.push(size as f32);
-                patches.reflectance.push(reflectance);
-                patches.emission.push(emission);
-            }
-        }
-    }
-    patches.regions = regions;
-    patches.triangle_region = triangle_region;
-    patches
-}
-
-/// Extent of a patch of a cluster of several faces; zero for a single face, whose area says it all.
-fn cluster_extent(geometry: &Geometry, region: &Region, element: u32) -> f64 {
-    if region.faces.len() == 1 {
-        return 0.0;
-    }
-    let [lower, upper] = bounds_of(region.polygons(geometry, element).iter().flatten());
-    (upper - lower).max_element()
-}
-
-/// Mean reflectance and emission of an element. Textures, and the materials of an object of several,
-/// are averaged over a regular grid of points; a single plain material costs nothing.
-fn mean_material(
-    surfaces: &Surfaces,
-    region: &Region,
-    element: u32,
-    side: Side,
-) -> (Reflectance, Exitance) {
-    const GRID: usize = 4;
-    let is_textured = |face: &FaceId| {
-        let material = surfaces.material(*face);
-        material.reflectance_texture.is_some() || material.emission_texture.is_some()
-    };
-    let first = surfaces.material_id(region.faces[0]);
-    if region
-        .faces
-        .iter()
-        .all(|&face| surfaces.material_id(face) == first)
-        && !is_textured(&region.faces[0])
-    {
-        let material = surfaces.material(region.faces[0]);
-        return (material.reflectance, material.emission.to_exitance());
-    }
-    let mut reflectance = DVec3::ZERO;
-    let mut emission = Exitance::ZERO;
-    for index in 0..GRID * GRID {
-        let centre = |i: usize| (i as f64 + 0.5) / GRID as f64;
-        let sample = region.sample(
-            surfaces.geometry(),
-            element,
-            side,
-            [centre(index % GRID), centre(index / GRID)],
-        );
-        let point = surfaces.locate(&region.faces, sample.position);
-        reflectance += surfaces.reflectance(point).0;
-        emission += surfaces.emission(point).to_exitance();
-    }
-    let weight = 1.0 / (GRID * GRID) as f64;
-    (Reflectance(reflectance * weight), emission * weight)
-}
-
-impl PatchId {
-    /// The id of the `index`-th patch.
-    pub fn new(index: usize) -> Self {
-        Self(index as u32)
-    }
 }

@@ -7,6 +7,7 @@
 //! triangle → region → element. Two-sided faces have a patch for each side. Elements on which walls stand
 //! that light cannot pass are divided along them (`separation`), so that no patch lies in two rooms.
 
+mod assemble;
 mod box_tree;
 mod clipped;
 mod cluster;
@@ -18,6 +19,7 @@ mod partition;
 mod plane;
 mod quad_grid;
 mod quads;
+mod refined;
 mod region;
 mod separation;
 mod triangle_grid;
@@ -37,6 +39,11 @@ use region::Region;
 pub struct PatchId(pub u32);
 
 impl PatchId {
+    /// The id of the `index`-th patch.
+    pub fn new(index: usize) -> Self {
+        Self(index as u32)
+    }
+
     /// The position in arrays by patch.
     pub fn index(self) -> usize {
         self.0 as usize

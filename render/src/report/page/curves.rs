@@ -1,8 +1,8 @@
 //! Error against cost.
 
 use super::{NRMSE, REL_RMSE, SECONDS, chart, figure, line, or_dash, plain, series};
+use crate::report::axis::{Axis, Spacing};
 use crate::report::html::{Column, table};
-use crate::report::plot::{Axis, Spacing};
 use crate::report::study::{FamilyResult, Row, Study};
 
 /// Errors whose price is listed.
