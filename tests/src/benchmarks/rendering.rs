@@ -8,9 +8,9 @@ use luxel::cli::ExitCode;
 use luxel::diff::{Difference, difference};
 use luxel::image::exr;
 
-/// The scenes with a path-traced picture, which luxel's is held against. (The corridor's camera sees its dark end
-/// alone, for which there is none.)
-pub const SCENES: [&str; 2] = ["cornell", "office"];
+/// The scenes, each with whether there is a path-traced picture, which luxel's is held against. There is none of the corridor, whose
+/// camera sees the dark end alone.
+pub const SCENES: [(&str, bool); 3] = [("cornell", true), ("corridor", false), ("office", true)];
 
 /// A picture and what it took.
 #[derive(Clone, Copy, Debug)]
@@ -21,15 +21,15 @@ pub struct Rendering {
     pub peak: Option<u64>,
     /// Relative error that the last picture states.
     pub stated: f64,
-    /// How far the last picture is from the reference, the noise of the reference included.
-    pub difference: Difference,
+    /// How far the last picture is from the reference, where there is one, its noise included.
+    pub difference: Option<Difference>,
 }
 
 /// Renders a scene `runs` times for an error of `percent`.
 ///
 /// # Panics
 /// When the command fails, other than by missing the error, or a reference cannot be read.
-pub fn picture(scene: &str, percent: f64, runs: u64) -> Rendering {
+pub fn picture((scene, has_reference): (&str, bool), percent: f64, runs: u64) -> Rendering {
     let folder_of_runs = tempfile::tempdir().expect("a temporary folder");
     let output = folder_of_runs.path().join("out.exr");
     let file = example(scene);
@@ -45,13 +45,16 @@ pub fn picture(scene: &str, percent: f64, runs: u64) -> Rendering {
         }
         outcome.json()["error"]["total"].as_f64()
     });
-    let picture = exr::read(&output).expect("a picture");
-    let reference = folder().join(scene).join("image.exr");
-    let reference = exr::read(&reference).expect("a reference picture");
+    let difference = has_reference.then(|| {
+        let picture = exr::read(&output).expect("a picture");
+        let reference = folder().join(scene).join("image.exr");
+        let reference = exr::read(&reference).expect("a reference picture");
+        difference(&picture.image, &reference.image).expect("pictures of one size")
+    });
     Rendering {
         seconds,
         peak,
         stated: stated.expect("a stated error"),
-        difference: difference(&picture.image, &reference.image).expect("pictures of one size"),
+        difference,
     }
 }
