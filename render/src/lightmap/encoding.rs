@@ -7,7 +7,7 @@
 //! | format | file | largest value | no channel changes by more than |
 //! |---|---|---|---|
 //! | exr | OpenEXR, 32-bit floats, ZIP | 3.4 · 10³⁸ | 2⁻²⁴ of itself |
-//! | hdr | Radiance RGBE | 1.7 · 10³⁸, from 8 · 10⁻³¹ | 2⁻⁸ of the pixel's largest channel |
+//! | hdr | Radiance RGBE | 1.7 · 10³⁸, from 8 · 10⁻³¹ | 2⁻⁸/(1 − 2⁻⁹) of the pixel's largest channel |
 //! | ktx2 | KTX2, half floats | 65 504 | 2⁻¹¹ of itself, below 2⁻¹⁴ 2⁻²⁵ |
 //! | bc6h | KTX2, BC6H | 65 504 | (no bound) |
 //! | rgbm | PNG, RGB and multiplier | the map's own | 1/255 of the pixel's largest channel, below R/255 R/130 050 |
