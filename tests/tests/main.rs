@@ -19,6 +19,7 @@ mod irradiance_fields;
 mod leaks;
 mod lightmap_contents;
 mod lightmaps;
+mod masks;
 mod ray_cast;
 mod references;
 mod sampling;

@@ -84,7 +84,6 @@ function compared(shown, reference, ids, id, level) {
   return {
     count,
     level: total('reference') / (3 * count),
-    levelOfAll: level,
     bias: total('shown') / total('reference') - 1,
     channels: sums.map((sum) => sum.shown / sum.reference - 1),
     rms: Math.sqrt(total('squares') / (3 * count)) / level,
