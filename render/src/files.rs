@@ -166,19 +166,32 @@ impl OutputFolder {
         self.remove_all(|name| name.starts_with(TEMPORARY))
     }
 
+    /// Names in it that suit.
+    fn names(&self, suits: impl Fn(&str) -> bool) -> Result<Vec<String>, OutputError> {
+        let refused = |error| OutputError::Refused(self.0.clone(), error);
+        let mut names = Vec::new();
+        for entry in fs::read_dir(&self.0).map_err(refused)? {
+            let name = entry.map_err(refused)?.file_name();
+            names.extend(name.to_str().filter(|name| suits(name)).map(str::to_owned));
+        }
+        Ok(names)
+    }
+
+    /// Whether there is a file in it whose name suits.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn holds(&self, suits: impl Fn(&str) -> bool) -> Result<bool, OutputError> {
+        Ok(!self.names(suits)?.is_empty())
+    }
+
     /// Removes the files in it whose names suit.
     ///
     /// # Errors
     /// When the system refuses.
     pub fn remove_all(&self, suits: impl Fn(&str) -> bool) -> Result<(), OutputError> {
-        let refused = |error| OutputError::Refused(self.0.clone(), error);
-        for entry in fs::read_dir(&self.0).map_err(refused)? {
-            let name = entry.map_err(refused)?.file_name();
-            if let Some(name) = name.to_str().filter(|name| suits(name)) {
-                self.remove(name)?;
-            }
-        }
-        Ok(())
+        let names = self.names(suits)?;
+        names.iter().try_for_each(|name| self.remove(name))
     }
 
     /// Makes `bytes` the content of a file in it, at once.

@@ -27,9 +27,12 @@ use std::time::{Duration, Instant};
 /// The name of the file of the work in progress.
 const NAME: &str = "checkpoint.luxel";
 
-/// The name of the file of a set of maps that is complete.
-fn name_of(index: usize) -> String {
-    format!("checkpoint_{index}.luxel")
+/// What the names of files of work that is complete begin with.
+const COMPLETE: &str = "checkpoint_";
+
+/// The name of the file of work that is complete: a set of maps by its number, or something else.
+fn name_of(what: impl fmt::Display) -> String {
+    format!("{COMPLETE}{what}.luxel")
 }
 
 /// What it begins with; the number is that of the format.
@@ -225,8 +228,8 @@ impl<'a, 'r> Keeper<'a, 'r> {
                 "{} is of work that was not finished: it will be replaced; with --resume that work would go on",
                 path.display()
             )),
-            (Resume::GoOn, false) if self.folder.path().join(name_of(0)).exists() => {
-                reporter.note(format_args!("going on after the maps that are complete"));
+            (Resume::GoOn, false) if self.folder.holds(|name| name.starts_with(COMPLETE))? => {
+                reporter.note(format_args!("going on after what is complete"));
             }
             (Resume::GoOn, false) => reporter.note(format_args!(
                 "there is no {}: the work begins from the start",
@@ -257,11 +260,14 @@ impl<'a, 'r> Keeper<'a, 'r> {
     /// When its file is broken or of other work.
     pub(super) fn begin(&self, index: usize) -> Result<Option<AtLuxels>, Failure> {
         self.index.set(index);
-        let path = self.folder.path().join(name_of(index));
-        if self.resume.get() == Resume::GoOn && path.exists() {
-            return self.read(&path).map(Some);
-        }
-        Ok(None)
+        self.complete(&name_of(index))
+    }
+
+    /// What a file of complete work holds, where the folder has it and it is to be taken up.
+    fn complete<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>, Failure> {
+        let path = self.folder.path().join(name);
+        let is_there = self.resume.get() == Resume::GoOn && path.exists();
+        is_there.then(|| self.read(&path)).transpose()
     }
 
     /// What the checkpoint was in the middle of, once, if that is what is worked on.
@@ -289,10 +295,10 @@ impl<'a, 'r> Keeper<'a, 'r> {
         name: &str,
         work: impl FnOnce() -> Result<Option<T>, Failure>,
     ) -> Result<Option<T>, Failure> {
-        let name = format!("checkpoint_{name}.luxel");
-        let path = self.folder.path().join(&name);
-        if self.resume.get() == Resume::GoOn && path.exists() {
-            return self.read(&path).map(Some);
+        let name = name_of(name);
+        let kept = self.complete(&name)?;
+        if kept.is_some() {
+            return Ok(kept);
         }
         let done = work()?;
         if let Some(done) = &done {
@@ -358,8 +364,7 @@ impl<'a, 'r> Keeper<'a, 'r> {
     }
 
     fn remove_complete(&self) -> Result<(), OutputError> {
-        self.folder
-            .remove_all(|name| name.starts_with("checkpoint_"))
+        self.folder.remove_all(|name| name.starts_with(COMPLETE))
     }
 
     /// Work is done: there is nothing to go on from.

@@ -145,7 +145,7 @@ impl Bake {
                 return Ok(None);
             };
             let mut layer = self.layer(world, &atlas, &luxels, include, &gathered);
-            if passes > 1 || !masked.is_empty() {
+            if passes > 1 {
                 keeper.keep_complete(&gathered);
             }
             drop(gathered);
