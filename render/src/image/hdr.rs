@@ -6,8 +6,8 @@
 //! adds half a step when it reads, later readers (stb_image, the `image` crate, Bevy, Godot) add nothing: for them mantissas are
 //! rounded here, where truncation would take 0.3 % of the light. three.js (`HDRLoader` of r187) reads all values 256/255 times as large.
 //!
-//! Valid from 2⁻¹⁰⁰, below which pixels become black, to 255 · 2¹¹⁹. No channel changes by more than 2⁻⁸ of the largest of its pixel:
-//! half a step of at most 2⁻⁷ of it. Cost: linear, at most 4 bytes a pixel.
+//! Valid from 2⁻¹⁰⁰, below which pixels become black, to 255 · 2¹¹⁹. No channel changes by more than 2⁻⁸/(1 − 2⁻⁹) of the largest of
+//! its pixel: half a step, of which 128 make the power of two that the largest is not below, or 2⁻⁹ of it below and rounded up to it. Cost: linear, at most 4 bytes a pixel.
 
 use image::codecs::hdr::HdrEncoder;
 use image::{ImageError, Rgb};
