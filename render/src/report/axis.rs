@@ -126,11 +126,11 @@ impl ValueFormatter<f64> for Span {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::numbers::plain;
     use super::*;
 
-    const LOG: Axis = Axis {
+    pub(in super::super) const LOG: Axis = Axis {
         label: "seconds",
         spacing: Spacing::Logarithmic,
         format: plain,

@@ -329,14 +329,8 @@ pub(super) fn bars(bars: &[Bar], description: &str, margins: [u32; 2]) -> String
 
 #[cfg(test)]
 mod tests {
-    use super::super::numbers::plain;
+    use super::super::axis::tests::LOG;
     use super::*;
-
-    const LOG: Axis = Axis {
-        label: "seconds",
-        spacing: Spacing::Logarithmic,
-        format: plain,
-    };
 
     #[test]
     fn a_chart_is_svg_with_escaped_text() {

@@ -7,7 +7,7 @@
 //! Σ y² − Σ_k z_k². Monomials that depend on those before them on the given points are left out.
 //!
 //! Coordinates lie within [−1, 1]: the condition number of cubics is then below 10⁵.
-//! Cost: 50 multiplications a point.
+//! Cost: 60 multiplications and divisions a point.
 
 /// The highest degree. Fourth powers gain nothing where cells can be halved instead.
 pub(super) const MAX_DEGREE: usize = 3;
