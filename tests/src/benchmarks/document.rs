@@ -81,26 +81,25 @@ corridor's dark end there is no such picture: what little light it gets has come
 | scene | seconds | nRMSE % | relRMSE % | stated % | peak MB |
 |---|--:|--:|--:|--:|--:|
 ";
-    for scene in rendering::SCENES {
-        let picture = rendering::picture(scene, 2.0, runs.min(3));
+    for (scene, reference) in rendering::SCENES {
+        let picture = rendering::picture(scene, reference, 2.0, runs.min(3));
         let errors = picture.difference.map(|difference| {
             let Difference {
                 nrmse, rel_rmse, ..
             } = difference;
             format!("{:.2} | {:.2}", 100.0 * nrmse, 100.0 * rel_rmse)
         });
-        let name = scene.0;
         row(
             &mut text,
             format_args!(
-                "{name} | {:.2} | {} | {:.2} | {}",
+                "{scene} | {:.2} | {} | {:.2} | {}",
                 picture.seconds,
                 errors.as_deref().unwrap_or("– | –"),
                 100.0 * picture.stated,
                 megabytes(picture.peak)
             ),
         );
-        done(&format!("render {name}"));
+        done(&format!("render {scene}"));
     }
     text += &large_scenes(runs, done);
     text += &transports(done);

@@ -8,9 +8,21 @@ use luxel::cli::ExitCode;
 use luxel::diff::{Difference, difference};
 use luxel::image::exr;
 
-/// The scenes, each with whether there is a path-traced picture, which luxel's is held against. There is none of the corridor, whose
-/// camera sees the dark end alone.
-pub const SCENES: [(&str, bool); 3] = [("cornell", true), ("corridor", false), ("office", true)];
+/// What luxel's picture of a scene is held against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reference {
+    /// A path-traced picture.
+    PathTraced,
+    /// Nothing: only the stated error is known.
+    Nothing,
+}
+
+/// The scenes with their references. There is none of the corridor, whose camera sees the dark end alone.
+pub const SCENES: [(&str, Reference); 3] = [
+    ("cornell", Reference::PathTraced),
+    ("corridor", Reference::Nothing),
+    ("office", Reference::PathTraced),
+];
 
 /// A picture and what it took.
 #[derive(Clone, Copy, Debug)]
@@ -29,7 +41,7 @@ pub struct Rendering {
 ///
 /// # Panics
 /// When the command fails, other than by missing the error, or a reference cannot be read.
-pub fn picture((scene, has_reference): (&str, bool), percent: f64, runs: u64) -> Rendering {
+pub fn picture(scene: &str, reference: Reference, percent: f64, runs: u64) -> Rendering {
     let folder_of_runs = tempfile::tempdir().expect("a temporary folder");
     let output = folder_of_runs.path().join("out.exr");
     let file = example(scene);
@@ -45,7 +57,7 @@ pub fn picture((scene, has_reference): (&str, bool), percent: f64, runs: u64) ->
         }
         outcome.json()["error"]["total"].as_f64()
     });
-    let difference = has_reference.then(|| {
+    let difference = (reference == Reference::PathTraced).then(|| {
         let picture = exr::read(&output).expect("a picture");
         let reference = folder().join(scene).join("image.exr");
         let reference = exr::read(&reference).expect("a reference picture");
