@@ -18,6 +18,9 @@ pub const LARGEST: f64 = 255.0 * (1_u128 << 119) as f64;
 /// The smallest largest channel that is not black.
 const SMALLEST: f64 = 1.0 / (1_u128 << 100) as f64;
 
+/// What a channel changes by at most, over the largest channel of its pixel: 2⁻⁸/(1 − 2⁻⁹).
+pub const BOUND: f64 = 2.0 / 511.0;
+
 /// Why a file cannot be encoded.
 #[derive(Debug, thiserror::Error)]
 #[error("the HDR encoder failed")]
@@ -102,7 +105,7 @@ mod tests {
                 prop_assert_eq!(found.map(f64::from), rounded(*pixel));
                 let largest = pixel.iter().copied().fold(0.0, f64::max);
                 for (value, found) in pixel.iter().zip(found) {
-                    prop_assert!((value - f64::from(found)).abs() <= largest / 256.0);
+                    prop_assert!((value - f64::from(found)).abs() <= BOUND * largest);
                 }
             }
         }

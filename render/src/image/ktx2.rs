@@ -174,9 +174,14 @@ fn values(notes: &[(&str, &str)]) -> Vec<u8> {
     bytes
 }
 
-/// The nearest half float, values beyond the largest being moved to it.
+/// The nearest half float, of two the even one; values beyond the largest are moved to it.
 pub fn half(value: f64) -> f16 {
-    f16::from_f64(value.clamp(-LARGEST, LARGEST))
+    let value = value.clamp(-LARGEST, LARGEST);
+    // Rounded here: `from_f64` rounds by way of 32 bits where the processor has such an instruction, and drops the lowest bits
+    // where it has not, so that files would differ between machines.
+    let exponent = (value.abs().to_bits() >> 52) as i32 - 1023;
+    let step = 2.0_f64.powi(exponent.max(-14) - 10);
+    f16::from_f64((value / step).round_ties_even() * step)
 }
 
 /// A level of half floats, alpha 1.

@@ -164,3 +164,26 @@ proptest! {
         prop_assert!(Reader::new(&file).is_ok());
     }
 }
+
+/// Rounded once: what lies beyond the middle of two half floats by less than 32 bits tell goes to the nearer.
+#[test]
+fn halves_are_the_nearest() {
+    for bits in 0..=0x7bff_u16 {
+        let exact = f16::from_bits(bits);
+        let [value, next] = [bits, bits + 1].map(|bits| f16::from_bits(bits).to_f64());
+        for sign in [1.0, -1.0] {
+            assert_eq!(half(sign * value), f16::from_f64(sign * value));
+        }
+        // The next above the largest is infinite.
+        if next.is_finite() {
+            let middle = 0.5 * (value + next);
+            let least = middle * 2.0_f64.powi(-50);
+            assert_eq!(half(middle - least), exact);
+            assert_eq!(half(middle + least).to_bits(), bits + 1);
+            assert_eq!(half(middle).to_bits(), bits + bits % 2);
+        }
+    }
+    assert_eq!(half(1e9).to_f64(), LARGEST);
+    assert_eq!(half(-1e9).to_f64(), -LARGEST);
+    assert!(half(f64::NAN).is_nan());
+}

@@ -109,8 +109,7 @@ fn bound(format: Format, value: f64, largest: f64, scale: f64) -> Option<f64> {
     let relative = |bits: i32| 2.0_f64.powi(-bits);
     Some(match format {
         Format::Exr => value * relative(24),
-        // From 1 − 2⁻⁹ of a power of two on the largest channel is rounded up to it, and half a step is 2⁻⁸ of that.
-        Format::Hdr => largest * relative(8) / (1.0 - relative(9)),
+        Format::Hdr => largest * hdr::BOUND,
         Format::Ktx2 => (value * relative(11)).max(relative(25)),
         Format::Rgbm if largest >= scale / 255.0 => largest / 255.0 * (1.0 + 1e-12),
         Format::Rgbm => scale / 130_050.0 * (1.0 + 1e-12),
