@@ -8,10 +8,11 @@ use super::{
     first_budget,
 };
 use crate::bounces::Bounces;
-use crate::gather::{Lookup, MAX_REPLICATES, error_parts, orders};
+use crate::error;
+use crate::gather::{Lookup, MAX_REPLICATES, error_parts, orders, share_of_solutions};
 use crate::patches::{Density, Patches};
 use crate::pilot::{self, PilotError};
-use crate::radiosity::{self, RadiosityConfig, RadiositySolution};
+use crate::radiosity::{self, RadiosityConfig};
 use crate::solvers::{Config, SystemError, Tolerance};
 use crate::world::{Receiver, World};
 
@@ -42,7 +43,7 @@ pub struct Adapted<'w, 's> {
 }
 
 impl<'w, 's> Adapted<'w, 's> {
-    /// Finds out where the light is. Solutions will be such that what is gathered from them was reflected as often as
+    /// Finds out where the light is, and where `receivers`, if there are any, need it. Solutions will be such that what is gathered from them was reflected as often as
     /// `bounces` says.
     ///
     /// # Errors
@@ -50,9 +51,14 @@ impl<'w, 's> Adapted<'w, 's> {
     ///
     /// # Panics
     /// When no bounce is asked for: nothing is then looked up.
-    pub fn new(world: &'w World<'s>, bounces: Bounces, seed: u64) -> Result<Self, PilotError> {
+    pub fn new(
+        world: &'w World<'s>,
+        receivers: &[Receiver],
+        bounces: Bounces,
+        seed: u64,
+    ) -> Result<Self, PilotError> {
         assert!(bounces.reflect(), "solutions hold reflected light");
-        let density = pilot::density(world, seed)?;
+        let density = pilot::density(world, receivers, seed)?;
         Ok(Self {
             world,
             density,
@@ -61,7 +67,7 @@ impl<'w, 's> Adapted<'w, 's> {
         })
     }
 
-    /// Solutions of about `patches` patches, and of a quarter of them. `Ok(None)` when `control`
+    /// Solutions of about `patches` patches, with what a quarter of them would show. `Ok(None)` when `control`
     /// stops.
     ///
     /// # Errors
@@ -77,25 +83,37 @@ impl<'w, 's> Adapted<'w, 's> {
         if control.begin(Stage::Solving, budget::solve_cost(patches), MAX_REPLICATES) < 1.0 {
             return Ok(None);
         }
-        let mut on_fine = Vec::new();
-        let mut on_coarse = Vec::new();
-        for replicate in 0..MAX_REPLICATES as u64 {
-            on_fine.push(self.solve_once(&fine, replicate)?);
-            on_coarse.push(self.solve_once(&coarse, replicate)?);
-            if !control.advance() {
-                return Ok(None);
+        let lookup = match self.bounces {
+            Bounces::All => {
+                let parents = error::parents(self.world.surfaces(), &fine, &coarse);
+                let sizes = parents.iter().map(|&parent| coarse.size(parent)).collect();
+                drop(coarse);
+                let once = |replicate| {
+                    let config = self.config(replicate);
+                    radiosity::solve_beside(self.world, &fine, &parents, &config)
+                };
+                replicates(control, once)?
+                    .map(|solutions| Lookup::new(fine, &solutions).with_parents(sizes, &solutions))
             }
-        }
-        let lookup = Lookup::new(fine, &on_fine).with_coarse(coarse, &on_coarse);
-        Ok(Some(lookup))
+            Bounces::AtMost(most) => {
+                let once = |replicate| {
+                    let (orders, config) = (orders(self.bounces), self.config(replicate));
+                    let solve = |patches: &Patches| {
+                        radiosity::solve_partial(self.world, patches, most, orders, &config)
+                    };
+                    Ok((solve(&fine)?, solve(&coarse)?))
+                };
+                replicates(control, once)?.map(|solutions| {
+                    let (on_fine, on_coarse): (Vec<_>, Vec<_>) = solutions.into_iter().unzip();
+                    Lookup::new(fine, &on_fine).with_coarse(coarse, &on_coarse)
+                })
+            }
+        };
+        Ok(lookup)
     }
 
-    fn solve_once(
-        &self,
-        patches: &Patches,
-        replicate: u64,
-    ) -> Result<RadiositySolution, SystemError> {
-        let config = RadiosityConfig {
+    fn config(&self, replicate: u64) -> RadiosityConfig {
+        RadiosityConfig {
             rays: ROW_RAYS,
             shadow_rays: 1,
             solver: Config {
@@ -104,13 +122,6 @@ impl<'w, 's> Adapted<'w, 's> {
             },
             seed: self.seed,
             replicate,
-        };
-        match self.bounces {
-            Bounces::All => radiosity::solve(self.world, patches, &config),
-            Bounces::AtMost(most) => {
-                let orders = orders(self.bounces);
-                radiosity::solve_partial(self.world, patches, most, orders, &config)
-            }
         }
     }
 
@@ -137,10 +148,18 @@ impl<'w, 's> Adapted<'w, 's> {
             };
             let mut gathering = Gathering::new(self.world, &sample, gathers(count), config);
             let evenly = gathering.evenly(pilot.shadow_rays);
-            if !gathering.go_on(Some(&lookup), pilot.rays, evenly, Stage::Pilot, control) {
+            let half = pilot.rays / 2;
+            if !gathering.go_on(Some(&lookup), half, Vec::new(), Stage::Pilot, control) {
+                return Ok(None);
+            }
+            let first = gathering.tallies.clone();
+            if !gathering.go_on(Some(&lookup), 2 * half, evenly, Stage::Pilot, control) {
                 return Ok(None);
             }
             let mut parts = error_parts(&gathering.tallies);
+            let share = share_of_solutions(&first, &gathering.tallies);
+            parts.gather = parts.gather.hypot(parts.solution * (1.0 - share).sqrt());
+            parts.solution *= share.sqrt();
             if count >= JOINED_FROM {
                 parts.gather /= USUAL_GAIN;
             }
@@ -166,4 +185,19 @@ impl<'w, 's> Adapted<'w, 's> {
             pilot.patches = finer.min(MESH_GROWTH * pilot.patches);
         }
     }
+}
+
+/// What `once` makes of each replicate; `Ok(None)` when `control` stops.
+fn replicates<T>(
+    control: &mut dyn Control,
+    once: impl Fn(u64) -> Result<T, SystemError>,
+) -> Result<Option<Vec<T>>, PilotError> {
+    let mut made = Vec::new();
+    for replicate in 0..MAX_REPLICATES as u64 {
+        made.push(once(replicate)?);
+        if !control.advance() {
+            return Ok(None);
+        }
+    }
+    Ok(Some(made))
 }

@@ -197,12 +197,12 @@ pub(super) fn gather_cost(rays: usize, shadow_rays: usize) -> f64 {
     rays as f64 + SHADOW_RAY_COST * shadow_rays as f64
 }
 
-/// Time of solving with so many patches, in units of gather rays, the coarser mesh included.
+/// Time of solving with so many patches, in units of gather rays, what larger patches would show included.
 pub(super) fn solve_cost(patches: usize) -> f64 {
     patches as f64 * patch_cost()
 }
 
-/// Time of a patch in all its solutions, with its quarter of a patch of the coarser mesh.
+/// Time of a patch in all its solutions; what larger ones would show takes no rays, but a quarter more in sweeps.
 fn patch_cost() -> f64 {
     1.25 * (MAX_REPLICATES * ROW_RAYS) as f64 * ROW_RAY_COST
 }

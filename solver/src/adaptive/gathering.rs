@@ -6,8 +6,8 @@ use super::checkpoint::{Checkpoint, Rays, Round, Step};
 use super::penumbrae::Penumbrae;
 use super::{Adaptive, AdaptiveConfig, Budget, Control, Ending, Stage};
 use crate::gather::{
-    GatherConfig, Key, Lookup, MAX_REPLICATES, SkyRays, Solutions, Tally, error_parts, gather,
-    joined,
+    GatherConfig, Guides, Key, Lookup, MAX_REPLICATES, SkyRays, Solutions, Tally, error_parts,
+    gather_guided, joined,
 };
 use crate::world::{Receiver, World};
 use std::borrow::Cow;
@@ -48,6 +48,7 @@ fn receivers_of_part(receivers: usize, rays: usize) -> usize {
 fn add_part(
     world: &World,
     lookup: Option<&Lookup>,
+    guides: Option<&Guides>,
     receivers: &[Receiver],
     positions: &[u32],
     config: &GatherConfig,
@@ -59,7 +60,7 @@ fn add_part(
     let of_part: Vec<Receiver> = of_part.collect();
     let keys = positions.iter().map(|&position| Key::of(position.into()));
     let keys: Vec<Key> = keys.collect();
-    let found = gather(world, lookup, &of_part, &keys, config);
+    let found = gather_guided(world, lookup, guides, &of_part, &keys, config);
     for (&position, more) in positions.iter().zip(&found) {
         tallies[position as usize].join(more);
     }
@@ -70,6 +71,7 @@ fn add_part(
 pub(super) fn add(
     world: &World,
     lookup: Option<&Lookup>,
+    guides: Option<&Guides>,
     receivers: &[Receiver],
     config: &GatherConfig,
     tallies: &mut [Tally],
@@ -77,7 +79,7 @@ pub(super) fn add(
 ) -> bool {
     let part = receivers_of_part(receivers.len(), config.rays + config.shadow_rays);
     all(receivers.len()).chunks(part).all(|positions| {
-        add_part(world, lookup, receivers, positions, config, tallies);
+        add_part(world, lookup, guides, receivers, positions, config, tallies);
         control.advance()
     })
 }
@@ -280,7 +282,7 @@ impl<'a> Gathering<'a> {
                 let positions = &due[..part.min(due.len())];
                 let lookup = lookup.filter(|_| config.rays > 0);
                 let tallies = &mut self.tallies;
-                add_part(world, lookup, receivers, positions, &config, tallies);
+                add_part(world, lookup, None, receivers, positions, &config, tallies);
                 self.done += positions.len();
                 let goes_on = control.advance();
                 // A pilot is made anew.

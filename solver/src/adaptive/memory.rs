@@ -8,25 +8,31 @@ use super::{SAFETY, WORTHWHILE};
 use crate::bounces::Bounces;
 use crate::field::Cells;
 use crate::gather::{Gathered, JOINED_COLUMNS, Lookup, MAX_REPLICATES, Tally, orders};
-use crate::patches::Patches;
+use crate::patches::{PatchId, Patches};
 use crate::radiosity::{self, RadiositySolution};
 use crate::world::Receiver;
 use luxel_scenes::Scene;
 
-/// Memory while a mesh of about so many patches is solved, and another of a quarter of them, in bytes: both meshes, all
+/// Memory while a mesh of about so many patches is solved, and what one of a quarter of them would show, in bytes: both meshes, all
 /// solutions, and the work on the last one.
 pub fn bytes_to_solve(patches: usize, bounces: Bounces, scene: &Scene) -> usize {
     let fine = Patches::at_most(patches);
     let coarse = fine / 4;
+    let has_parents = bounces == Bounces::All;
     let solutions = |patches| {
-        let own = RadiositySolution::bytes_for(patches, false);
+        let own = RadiositySolution::bytes_for(patches, has_parents);
         MAX_REPLICATES * (own + RadiositySolution::bytes_for_orders(patches, orders(bounces)))
+    };
+    let of_coarse = if has_parents {
+        fine * size_of::<(PatchId, f32)>()
+    } else {
+        solutions(coarse)
     };
     Patches::bytes_for(fine, scene)
         + Patches::bytes_for(coarse, scene)
         + solutions(fine)
-        + solutions(coarse)
-        + radiosity::bytes_to_solve(fine, ROW_RAYS, false)
+        + of_coarse
+        + radiosity::bytes_to_solve(fine, ROW_RAYS, has_parents)
 }
 
 /// As [`bytes_to_solve`], while coarser solutions are kept that the new ones take the place of: at least

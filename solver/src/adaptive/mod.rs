@@ -187,7 +187,7 @@ pub fn irradiance(
     let mut lookup = None;
     let mut adapted = None;
     if config.components != Components::Direct {
-        let scene = adapted.insert(Adapted::new(world, config.bounces, config.seed)?);
+        let scene = adapted.insert(Adapted::new(world, receivers, config.bounces, config.seed)?);
         match scene.prepare(receivers, receivers.len(), config, control)? {
             Some((solved, planned)) => {
                 let (share, fewest) = if receivers.len() >= JOINED_FROM {
@@ -232,7 +232,7 @@ pub fn resume(
     let mut lookup = None;
     let mut adapted = None;
     if config.components != Components::Direct {
-        let scene = adapted.insert(Adapted::new(world, config.bounces, config.seed)?);
+        let scene = adapted.insert(Adapted::new(world, receivers, config.bounces, config.seed)?);
         lookup = scene.solve(gathering.spent.patches, control)?;
         if lookup.is_none() {
             return Ok(Adaptive::none());
@@ -349,8 +349,8 @@ pub fn irradiance_for(
     let config = &config.within_bounces();
     let mut lookup = None;
     if config.components != Components::Direct {
-        lookup =
-            Adapted::new(world, config.bounces, config.seed)?.solve(budget.patches, control)?;
+        lookup = Adapted::new(world, receivers, config.bounces, config.seed)?
+            .solve(budget.patches, control)?;
         if lookup.is_none() {
             return Ok(Adaptive::none());
         }

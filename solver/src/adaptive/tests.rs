@@ -175,7 +175,7 @@ fn a_field_is_as_exact_as_it_says() {
     let scene = generate::cornell_box();
     let world = World::new(&scene);
     let receivers = on_the_floor(&world, 64);
-    let adapted = Adapted::new(&world, Bounces::All, 1).expect("a scene");
+    let adapted = Adapted::new(&world, &[], Bounces::All, 1).expect("a scene");
     let lookup = adapted.solve(2000, &mut unlimited(0.0)).expect("a scene");
     let lookup = lookup.expect("nothing stops it");
     let weights = vec![luxel_scenes::Rgb::ONE; receivers.len()];

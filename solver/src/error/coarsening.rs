@@ -40,7 +40,7 @@ pub fn coarsening(
     for length in [parents.len(), weights.len(), reflectance.len()] {
         assert_eq!(length, transport.len(), "one value per unknown");
     }
-    let averaged = average(parents, weights, radiosity);
+    let averaged = average_radiosity(parents, weights, radiosity);
     let within: Vec<Radiosity> = radiosity
         .iter()
         .zip(&averaged)
@@ -56,7 +56,7 @@ pub fn coarsening(
             .zip(&d)
             .map(|(rho, e)| Radiosity(rho.0 * e.0))
             .collect();
-        transport.gather(&average(parents, weights, &reflected), &mut next);
+        transport.gather(&average_radiosity(parents, weights, &reflected), &mut next);
         let (mut change, mut largest) = (0.0_f64, 0.0_f64);
         for ((value, start), next) in d.iter_mut().zip(&first).zip(&next) {
             let updated = start.0 + next.0;
@@ -71,28 +71,31 @@ pub fn coarsening(
     d
 }
 
-/// P R B.
-fn average(parents: &[u32], weights: &[f64], radiosity: &[Radiosity]) -> Vec<Radiosity> {
+/// P R x: each value's mean over the unknowns of the same parent, by their weights. Unknowns without weight keep their own.
+pub(crate) fn average(parents: &[u32], weights: &[f64], values: &[Rgb]) -> Vec<Rgb> {
     let count = parents.iter().map(|&parent| parent + 1).max().unwrap_or(0);
     let mut sums = vec![(Rgb::ZERO, 0.0); count as usize];
-    for ((&parent, weight), b) in parents.iter().zip(weights).zip(radiosity) {
+    for ((&parent, weight), &value) in parents.iter().zip(weights).zip(values) {
         let sum = &mut sums[parent as usize];
-        sum.0 += b.0 * *weight;
+        sum.0 += value * *weight;
         sum.1 += weight;
     }
     parents
         .iter()
         .zip(weights)
-        .zip(radiosity)
+        .zip(values)
         .map(|((&parent, &weight), &own)| {
             let (sum, total) = sums[parent as usize];
-            if weight > 0.0 {
-                Radiosity(sum / total)
-            } else {
-                own
-            }
+            if weight > 0.0 { sum / total } else { own }
         })
         .collect()
+}
+
+/// The same of radiosities.
+fn average_radiosity(parents: &[u32], weights: &[f64], radiosity: &[Radiosity]) -> Vec<Radiosity> {
+    let values: Vec<Rgb> = radiosity.iter().map(|b| b.0).collect();
+    let means = average(parents, weights, &values);
+    means.into_iter().map(Radiosity).collect()
 }
 
 /// The patch of `coarse` that each patch of `fine` lies in, by one of its points; both are meshes of the
@@ -138,7 +141,7 @@ mod tests {
             let mut e = vec![Irradiance::ZERO; 4];
             for _ in 0..200 {
                 let seen = if coarse {
-                    average(&parents, &weights, &b)
+                    average_radiosity(&parents, &weights, &b)
                 } else {
                     b.clone()
                 };

@@ -6,8 +6,8 @@
 //! used: with occlusion p is not the same everywhere, and extrapolated light was measured to be worse
 //! in 12 of 15 cases. The size of D is a good measure of the size of the error all the same.
 //!
-//! D holds the noise of both solutions. The mean square over all receivers is freed of it; a single
-//! receiver's is not known well enough.
+//! D holds the noise of both solutions, or what is left of it when both come from the same rays. The mean square over all
+//! receivers is freed of it; a single receiver's is not known well enough.
 
 /// Error of a mesh over its difference from one of a quarter of the patches: a tuned value.
 const ERROR_OVER_DIFFERENCE: f64 = 0.75;

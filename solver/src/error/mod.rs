@@ -6,12 +6,13 @@
 //! |---|---|---|
 //! | solver | what the iteration leaves | a rigorous bound from the residual ([`crate::solvers`]) |
 //! | sampling | noise of rows, of shadow rays and of the gather | the scatter of independent randomisations, [moderated](moderate) |
-//! | discretisation | patches of finite size | two meshes looked up at the same hits ([`crate::gather`], [`fn@coarsening`]) |
+//! | discretisation | patches of finite size | larger patches looked up by the same rays ([`crate::gather`], [`fn@coarsening`]) |
 
 mod coarsening;
 mod discretisation;
 mod moderate;
 
+pub(crate) use coarsening::average;
 pub use coarsening::{coarsening, parents};
 pub use discretisation::discretisation;
 pub use moderate::moderate;

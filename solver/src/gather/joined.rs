@@ -5,6 +5,7 @@
 //! over gathers are widened by what the residuals tell of the bias. Direct light is not joined: its noise is that of
 //! penumbrae alone and differs too much within a cell (joined, 1.5 times what was stated was wrong).
 
+use super::guide::Guides;
 use super::lookup::MAX_REPLICATES;
 use super::tally::Tally;
 use crate::field::{Cells, Field, Value, regions};
@@ -139,7 +140,7 @@ const OF_REPLICATE: usize = 9;
 impl IndirectField {
     /// Memory of a field of so many receivers, and of what it is made from, in bytes.
     pub fn bytes_for(receivers: usize) -> usize {
-        Cells::bytes_for(receivers, OF_REPLICATE * MAX_REPLICATES)
+        Cells::bytes_for(receivers, OF_REPLICATE * MAX_REPLICATES) + Guides::bytes_for(receivers)
     }
 
     /// Joins the light that gather rays found at receivers. Replicate r of the field is that of gather r and

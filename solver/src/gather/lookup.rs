@@ -2,8 +2,10 @@
 //!
 //! Several independent solutions stand side by side, so that one hit sees all of them: their mean is
 //! the result, and their scatter over the *same* hits is the noise of the solution, free of the
-//! gather's own. A second, coarser mesh with solutions of its own may be looked up at the same hits;
-//! the difference of the two tells what finite patches leave out, again free of the gather's noise.
+//! gather's own. What coarser patches show may be looked up at the same hits, either those of a second mesh with solutions
+//! of its own or the means over the patches of which each would be a part, from the same rows;
+//! the difference of the two tells what finite patches leave out, again free of the gather's noise, and with the same rows
+//! of most of the noise of the solutions, too.
 //! Single precision: 6·10⁻⁸ relative, far below what rays can resolve. Cost: 12 bytes a class and
 //! solution; the solutions of a class lie next to each other in memory. Where reflections are counted
 //! ([`Bounces`]) each link of a chain looks up light that was reflected once less: as many times the memory.
@@ -15,7 +17,7 @@ use crate::patches::{PatchId, Patches, Side};
 use crate::radiosity::{Class, RadiositySolution, unknown};
 use crate::solvers::Ledger;
 use glam::{DVec3, Vec3};
-use luxel_scenes::{Rgb, Scene};
+use luxel_scenes::{Irradiance, Rgb, Scene};
 use std::ops::Range;
 
 /// Largest number of independent solutions (and of independent gathers).
@@ -27,12 +29,25 @@ pub(crate) type PerSolution = [Rgb; MAX_REPLICATES];
 /// Meshes with their solutions.
 pub struct Lookup {
     fine: Table,
-    coarse: Option<Table>,
+    coarse: Option<Coarse>,
     solutions: usize,
     /// Of the light that a gather from here finds: once more than of what is looked up.
     bounces: Bounces,
     solver_bound: f64,
     ledger: Ledger,
+}
+
+/// What coarser patches show.
+enum Coarse {
+    /// Those of another mesh.
+    Mesh(Table),
+    /// Those that the patches of the mesh would be parts of.
+    Parents {
+        /// As [`Table::irradiance`], of a whole series.
+        irradiance: Vec<Vec3>,
+        /// By patch, in units.
+        sizes: Vec<f32>,
+    },
 }
 
 /// Which of the solutions count.
@@ -86,17 +101,38 @@ impl Lookup {
             self.bounces.before_reflection(),
             "the same light"
         );
-        self.coarse = Some(Table::new(patches, solutions));
+        self.coarse = Some(Coarse::Mesh(Table::new(patches, solutions)));
         self
     }
 
-    /// Memory of so many solutions on so many patches, and on a quarter as many, in bytes, for a gather of such bounces.
+    /// Adds what larger patches show, of `sizes` in units by patch of the mesh, for the error that patches make.
+    ///
+    /// # Panics
+    /// When the solutions do not know ([`crate::radiosity::solve_beside`]), or there is not one size a patch.
+    #[must_use]
+    pub(crate) fn with_parents(mut self, sizes: Vec<f32>, solutions: &[RadiositySolution]) -> Self {
+        let patches = self.fine.patches.len();
+        assert_eq!(sizes.len(), patches, "one size a patch");
+        let of = |solution: &RadiositySolution, unknown: usize| solution.coarse()[unknown];
+        self.coarse = Some(Coarse::Parents {
+            irradiance: side_by_side(patches, solutions, of),
+            sizes,
+        });
+        self
+    }
+
+    /// Memory of so many solutions on so many patches, and of what coarser ones show, in bytes, for a gather of such bounces.
     pub fn bytes_for(patches: usize, solutions: usize, bounces: Bounces, scene: &Scene) -> usize {
         let table = |patches: usize| {
             Patches::bytes_for(patches, scene)
                 + patches * Class::COUNT * solutions * orders(bounces) * size_of::<Vec3>()
         };
-        table(patches) + table(patches / 4)
+        let own = Class::COUNT * solutions * size_of::<Vec3>() + size_of::<f32>();
+        table(patches)
+            + match bounces {
+                Bounces::All => patches * own,
+                Bounces::AtMost(_) => table(patches / 4),
+            }
     }
 
     /// The mesh that is looked up.
@@ -139,24 +175,52 @@ impl Lookup {
         self.fine.irradiance(link, patch, distance, self.solutions)
     }
 
-    /// The same at a position (unit frame) of a triangle, seen from `origin`, on the coarse mesh, with the size of its patch in units; `None` without
-    /// one.
-    pub(super) fn coarse_irradiance(
-        &self,
-        link: u32,
-        origin: DVec3,
-        triangle: TriangleId,
-        position: DVec3,
-        side: Side,
-        distance: f32,
-    ) -> Option<(&[Vec3], f32)> {
-        let coarse = self.coarse.as_ref()?;
-        let patch = coarse
-            .patches
-            .seen_from(origin, triangle, || position, side)?;
-        let irradiance = coarse.irradiance(link, patch, distance, self.solutions);
-        Some((irradiance, coarse.patches.size(patch)))
+    /// The same as coarser patches show it, with the size of that in the place of `patch`, in units: at a position (unit frame)
+    /// of a triangle, seen from `origin`. `None` without such.
+    pub(super) fn coarse_irradiance(&self, link: u32, hit: &Seen) -> Option<(&[Vec3], f32)> {
+        match self.coarse.as_ref()? {
+            Coarse::Mesh(table) => {
+                let patches = &table.patches;
+                let patch =
+                    patches.seen_from(hit.origin, hit.triangle, || hit.position, hit.side)?;
+                let irradiance = table.irradiance(link, patch, hit.distance, self.solutions);
+                Some((irradiance, patches.size(patch)))
+            }
+            Coarse::Parents { irradiance, sizes } => {
+                let class = Class::at(hit.distance, self.fine.patches.size(hit.patch));
+                let first = unknown(hit.patch, class) * self.solutions;
+                let irradiance = &irradiance[first..first + self.solutions];
+                Some((irradiance, sizes[hit.patch.index()]))
+            }
+        }
     }
+}
+
+/// A hit of a ray from `origin`, in the unit frame.
+pub(super) struct Seen {
+    pub(super) origin: DVec3,
+    pub(super) triangle: TriangleId,
+    pub(super) position: DVec3,
+    pub(super) side: Side,
+    pub(super) distance: f32,
+    /// Of the mesh.
+    pub(super) patch: PatchId,
+}
+
+/// The values of all solutions by unknown and, within it, by solution.
+fn side_by_side(
+    patches: usize,
+    solutions: &[RadiositySolution],
+    of: impl Fn(&RadiositySolution, usize) -> Irradiance,
+) -> Vec<Vec3> {
+    (0..patches * Class::COUNT)
+        .flat_map(|unknown| {
+            let of = &of;
+            solutions
+                .iter()
+                .map(move |solution| of(solution, unknown).0.as_vec3())
+        })
+        .collect()
 }
 
 /// Tables that a gather of such bounces looks up: one for each link of its chains.
@@ -187,14 +251,9 @@ impl Table {
     fn new(patches: Patches, solutions: &[RadiositySolution]) -> Self {
         let orders = solutions[0].orders().len();
         let of_order = |order: usize| {
-            let unknowns = 0..patches.len() * Class::COUNT;
-            unknowns
-                .flat_map(|unknown| {
-                    solutions
-                        .iter()
-                        .map(move |solution| solution.orders()[order][unknown].0.as_vec3())
-                })
-                .collect()
+            let of =
+                |solution: &RadiositySolution, unknown: usize| solution.orders()[order][unknown];
+            side_by_side(patches.len(), solutions, of)
         };
         Self {
             irradiance: (0..orders).map(of_order).collect(),

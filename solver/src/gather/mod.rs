@@ -18,12 +18,16 @@
 //! furnished room continue once.
 
 mod error_parts;
+mod guide;
+mod interaction;
 mod joined;
 mod lookup;
 mod near_chain;
 mod tally;
 
 pub use error_parts::{ErrorParts, error_parts};
+pub(crate) use guide::Guides;
+pub(crate) use interaction::share_of_solutions;
 pub(crate) use joined::COLUMNS as JOINED_COLUMNS;
 pub use joined::{IndirectField, joined};
 pub(crate) use lookup::orders;
@@ -133,6 +137,22 @@ pub fn gather(
     keys: &[Key],
     config: &GatherConfig,
 ) -> Vec<Tally> {
+    gather_guided(world, lookup, None, receivers, keys, config)
+}
+
+/// As [`gather`], with gather rays in directions that guides tell; the item of a key is the receiver's position among those
+/// that the guides were learned for.
+///
+/// # Panics
+/// As [`gather`], and when a guide is missing.
+pub(crate) fn gather_guided(
+    world: &World,
+    lookup: Option<&Lookup>,
+    guides: Option<&Guides>,
+    receivers: &[Receiver],
+    keys: &[Key],
+    config: &GatherConfig,
+) -> Vec<Tally> {
     assert_eq!(receivers.len(), keys.len(), "one key for each receiver");
     assert!(
         (1..=MAX_REPLICATES).contains(&config.gathers),
@@ -174,6 +194,7 @@ pub fn gather(
             let mut tallies = vec![empty; receivers.len()];
             let mut direct = DirectSampler::new(world.lights(), world.bvh());
             let mut chains = Chains::new(world, lookup, config.solutions, sky_is_apart);
+            chains.follow_guides(guides);
             if sky_is_apart && wants_direct && config.shadow_rays > 0 {
                 add_sky(world, receivers, keys, config, &mut tallies);
             }

@@ -21,7 +21,8 @@
 //! Measured on furnished rooms: the error that finite patches make falls 1.3–3 times, and the
 //! relative error in dark places from 219 % to 4.5 %.
 
-use super::lookup::{Lookup, MAX_REPLICATES, PerSolution, Solutions};
+use super::guide::Guides;
+use super::lookup::{Lookup, MAX_REPLICATES, PerSolution, Seen, Solutions};
 use super::{Key, Tally};
 use crate::bvh::{Hit, Ray};
 use crate::direct::{DirectSampler, Sample, ShadowRays};
@@ -139,6 +140,7 @@ pub(crate) struct Chains<'a> {
     solutions: Solutions,
     /// Whether receivers get the light of the sky by other rays.
     sky_is_apart: bool,
+    guides: Option<&'a Guides>,
     direct: DirectSampler<'a>,
     paths: Vec<Path>,
     rays: Vec<Ray>,
@@ -157,11 +159,17 @@ impl<'a> Chains<'a> {
             lookup,
             solutions,
             sky_is_apart,
+            guides: None,
             direct: DirectSampler::new(world.lights(), world.bvh()),
             paths: Vec::new(),
             rays: Vec::new(),
             hits: Vec::new(),
         }
+    }
+
+    /// Lets the rays of receivers go where guides tell, whose items the receivers are.
+    pub(super) fn follow_guides(&mut self, guides: Option<&'a Guides>) {
+        self.guides = guides;
     }
 
     /// Casts `rays` rays from each receiver, after the `before` first of its sequence, and follows
@@ -230,14 +238,17 @@ impl<'a> Chains<'a> {
             let sequence = Sequence::new(seed, Stage::GATHER, key.item);
             let frame = sampling::Frame::around(receiver.normal.as_vec3());
             let first = before.wrapping_add(key.index.wrapping_mul(rays));
+            let guide = self.guides.map(|guides| guides.of(key));
             for ray in (0..rays).map(|ray| first.wrapping_add(ray)) {
-                let local = cosine_hemisphere::sample(sequence.point2_f32(ray));
+                let even = sequence.point2_f32(ray);
+                let (point, weight) = guide.map_or((even, 1.0), |guide| guide.sample(even));
+                let local = cosine_hemisphere::sample(point);
                 self.rays
                     .push(Ray::new(receiver.origin, frame.to_world(local)));
                 self.paths.push(Path {
                     receiver: slot as u32,
                     ray,
-                    throughput: Rgb::ONE,
+                    throughput: Rgb::splat(f64::from(weight)),
                     found: Rgb::ZERO,
                 });
             }
@@ -295,9 +306,15 @@ impl<'a> Chains<'a> {
             let range = lookup.range(self.solutions);
             if hit.t >= REACH * patches.size(patch) || link == MAX_LINKS {
                 found.look_up(&mut path, throughput, shown, range.clone());
-                if let Some((coarse, size)) =
-                    lookup.coarse_irradiance(link, origin, triangle, position, side, hit.t)
-                {
+                let seen = Seen {
+                    origin,
+                    triangle,
+                    position,
+                    side,
+                    distance: hit.t,
+                    patch,
+                };
+                if let Some((coarse, size)) = lookup.coarse_irradiance(link, &seen) {
                     let is_near = hit.t < REACH * size;
                     let weight = if is_near { NEAR_WEIGHT } else { 1.0 };
                     found.compare(throughput * weight, shown, coarse, range);

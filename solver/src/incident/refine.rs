@@ -91,7 +91,9 @@ pub fn until<const N: usize>(
     };
     let adapted = match aim.components {
         Components::Direct => None,
-        Components::All | Components::Indirect => Some(Adapted::new(world, aim.bounces, aim.seed)?),
+        Components::All | Components::Indirect => {
+            Some(Adapted::new(world, &[], aim.bounces, aim.seed)?)
+        }
     };
     let solve = |patches: usize, control: &mut dyn Control| match &adapted {
         Some(adapted) => adapted.solve(patches, control).map(|lookup| (lookup, true)),

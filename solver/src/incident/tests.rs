@@ -341,7 +341,7 @@ fn results_depend_on_items_alone() {
     let corner = DVec3::new(1.5, 3.0, 1.5);
     push(&mut scene, &parallelogram(corner, DVec3::X, DVec3::Z), 5.0);
     let world = World::new(&scene);
-    let adapted = crate::adaptive::Adapted::new(&world, Bounces::All, 1).expect("a density");
+    let adapted = crate::adaptive::Adapted::new(&world, &[], Bounces::All, 1).expect("a density");
     let lookup = adapted.solve(200, &mut AtOnce).expect("a solution");
     let lookup = lookup.expect("a solution");
     let places: Vec<Place> = (0..40)

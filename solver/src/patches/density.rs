@@ -4,6 +4,11 @@
 //! that bright places are worth more patches than dark ones: density ∝ clamp(0.3 + 0.7 E/Ē, 0.3, 4)
 //! with the irradiance E of a coarse pilot solution and its mean Ē. The form and its constants are
 //! measured: nothing finer (nearness of other surfaces, both together) gained consistently.
+//!
+//! Where receivers are known, so is what an error on a patch means to them, its importance Ψ
+//! ([`crate::radiosity`]). Rows of scatter σ leave a noise of Σ Ψ² σ²/n at the receivers, which a density in proportion to
+//! Ψσ lessens most (J. Neyman, 1934). A pilot knows Ψ and σ of dark places badly and the size of patches asks for
+//! more even ones: the root of it is taken.
 //! Validity: any pilot; its noise makes patches uneven, not wrong. Cost: one lookup in the pilot's
 //! patches for each of the samples of a new patch.
 
@@ -18,6 +23,11 @@ const DARK: f64 = 0.3;
 
 /// Largest density. Higher, and the patches beside a lamp take those of the rest of the room.
 const BRIGHTEST: f64 = 4.0;
+
+/// The same where receivers are known. Wider: a dark room that they stand in needs most of the patches, and the lit one behind
+/// a door, which is a thousand times as bright, few.
+const UNIMPORTANT: f64 = 0.05;
+const MOST_IMPORTANT: f64 = 64.0;
 
 /// Patches per area relative to the mean of the scene, from a coarse pilot mesh.
 pub struct Density {
@@ -75,14 +85,34 @@ impl Density {
     /// # Panics
     /// When there is not one irradiance per patch.
     pub fn following(surfaces: &Surfaces, pilot: Patches, irradiance: &[f64]) -> Self {
+        Self::between(surfaces, pilot, irradiance, [DARK, BRIGHTEST])
+    }
+
+    /// The density for receivers at which each patch of `pilot` makes so much noise, in any unit: importance per area
+    /// times scatter. Uniform where there is none at all.
+    ///
+    /// # Panics
+    /// When there is not one number per patch.
+    pub fn lessening(surfaces: &Surfaces, pilot: Patches, noise: &[f64]) -> Self {
+        let root: Vec<f64> = noise.iter().map(|noise| noise.sqrt()).collect();
+        Self::between(surfaces, pilot, &root, [UNIMPORTANT, MOST_IMPORTANT])
+    }
+
+    /// The density that rises from the least with a weight, relative to its mean over the area, up to the largest.
+    fn between(
+        surfaces: &Surfaces,
+        pilot: Patches,
+        weights: &[f64],
+        [least, largest]: [f64; 2],
+    ) -> Self {
         let area: f64 = pilot.area.iter().sum();
-        let weighted = pilot.area.iter().zip(irradiance).map(|(a, e)| a * e);
+        let weighted = pilot.area.iter().zip(weights).map(|(a, w)| a * w);
         let mean = weighted.sum::<f64>() / area;
-        let of_patch = irradiance
+        let of_patch = weights
             .iter()
-            .map(|e| {
-                let relative = if mean > 0.0 { e / mean } else { 1.0 };
-                (DARK + (1.0 - DARK) * relative).clamp(DARK, BRIGHTEST)
+            .map(|weight| {
+                let relative = if mean > 0.0 { weight / mean } else { 1.0 };
+                (least + (1.0 - least) * relative).clamp(least, largest)
             })
             .collect();
         Self::new(surfaces, pilot, of_patch)

@@ -222,7 +222,7 @@ fn refined_and_graded_meshes_keep_rooms_apart() {
     for (name, faces) in walls() {
         let scene = scene_of(&faces, DQuat::IDENTITY);
         let world = World::new(&scene);
-        let density = crate::pilot::density(&world, 1).expect("solves");
+        let density = crate::pilot::density(&world, &[], 1).expect("solves");
         let graded = world.mesh_with_density(300, &density).expect("meshes");
         check_dark(&format!("{name}, graded"), &world, &graded, DQuat::IDENTITY);
         let mut patches = world.mesh(PatchSize::Length(1.0)).expect("meshes");

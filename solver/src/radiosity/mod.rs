@@ -4,10 +4,12 @@
 //! computed apart at the sample points of the patches, so that the system carries reflected light
 //! only: B = ρ (E^direct + F B).
 
+mod importance;
 mod memory;
 mod partial;
 mod rows;
 
+pub(crate) use importance::{Flow, flow};
 pub use memory::bytes_to_solve;
 pub use partial::solve_partial;
 
@@ -88,6 +90,7 @@ pub struct RadiositySolution {
     bounces: Bounces,
     rays: Vec<u32>,
     coarsening: Vec<Irradiance>,
+    coarse: Vec<Irradiance>,
     /// How the iteration ended.
     pub outcome: Outcome,
     /// Sweeps of the solver.
@@ -108,7 +111,7 @@ impl RadiositySolution {
     /// Memory of the solution of so many patches, in bytes; `against` parents with what they would have given less.
     pub fn bytes_for(patches: usize, against: bool) -> usize {
         patches * Class::COUNT * size_of::<(Irradiance, u32)>()
-            + usize::from(against) * patches * size_of::<Irradiance>()
+            + usize::from(against) * patches * Class::COUNT * size_of::<Irradiance>()
     }
 
     /// Memory of the light of a partial sum that was reflected less often, in `orders` tables with the first, in bytes.
@@ -151,6 +154,12 @@ impl RadiositySolution {
         value.copied().unwrap_or(Irradiance::ZERO)
     }
 
+    /// Irradiance in W/m² that patches as large as the parents of [`solve_beside`] show in the place of each unknown; empty after
+    /// [`solve`] and [`solve_against`].
+    pub(crate) fn coarse(&self) -> &[Irradiance] {
+        &self.coarse
+    }
+
     /// True when some sample point of the patch lies in the open and not inside a solid.
     pub fn is_exposed(&self, patch: PatchId) -> bool {
         Class::all()
@@ -171,7 +180,7 @@ pub fn solve(
     patches: &Patches,
     config: &RadiosityConfig,
 ) -> Result<RadiositySolution, SystemError> {
-    run(world, patches, None, config)
+    Ok(Solved::new(world, patches, config)?.finish())
 }
 
 /// As [`solve`], and tells besides what larger patches would have given, by the same rays:
@@ -187,7 +196,50 @@ pub fn solve_against(
     config: &RadiosityConfig,
 ) -> Result<RadiositySolution, SystemError> {
     let parents = error::parents(world.surfaces(), patches, coarse);
-    run(world, patches, Some(&parents), config)
+    let solved = Solved::new(world, patches, config)?;
+    let d = solved.against(&parents).differences;
+    let mut solution = solved.finish();
+    solution.coarsening = patches
+        .ids()
+        .map(|patch| {
+            let own = Class::all().map(|class| unknown(patch, class));
+            let weights = own.map(|u| f64::from(solution.rays[u]));
+            let total: f64 = weights.iter().sum();
+            let sum: Irradiance = own.iter().zip(weights).map(|(&u, w)| d[u] * w).sum();
+            // A patch inside a solid has no share of its area.
+            if total > 0.0 {
+                sum * (1.0 / total)
+            } else {
+                Irradiance::ZERO
+            }
+        })
+        .collect();
+    Ok(solution)
+}
+
+/// As [`solve`], and keeps besides what larger patches would show in the place of each, by the same rays: `parents` are those that
+/// each patch would be a part of ([`error::parents`]).
+///
+/// # Errors
+/// As [`solve`].
+pub(crate) fn solve_beside(
+    world: &World,
+    patches: &Patches,
+    parents: &[PatchId],
+    config: &RadiosityConfig,
+) -> Result<RadiositySolution, SystemError> {
+    let solved = Solved::new(world, patches, config)?;
+    let Against {
+        unknowns,
+        differences,
+    } = solved.against(parents);
+    let light = solved.assembly.with_direct(&solved.solution.irradiance);
+    let light = light.iter().zip(&differences).map(|(e, d)| e.0 - d.0);
+    let light: Vec<Rgb> = light.collect();
+    let shown = error::average(&unknowns, &solved.assembly.areas, &light);
+    let mut solution = solved.finish();
+    solution.coarse = shown.into_iter().map(Irradiance).collect();
+    Ok(solution)
 }
 
 /// A system with what it is made of.
@@ -250,61 +302,78 @@ impl Assembly {
     }
 }
 
-fn run(
-    world: &World,
-    patches: &Patches,
-    parents: Option<&[PatchId]>,
-    config: &RadiosityConfig,
-) -> Result<RadiositySolution, SystemError> {
-    let assembly = Assembly::new(world, patches, config);
-    let system = assembly.system()?;
-    let solution = solvers::jacobi(&system, &config.solver, solvers::no_progress);
-    let Assembly {
-        cast,
-        reflectance,
-        areas,
-        ..
-    } = &assembly;
-    let coarsening = parents.map_or_else(Vec::new, |parents| {
-        let classes: Vec<u32> = parents
+/// What larger patches would give less.
+struct Against {
+    /// By unknown, that of its parent.
+    unknowns: Vec<u32>,
+    /// By unknown, in W/m².
+    differences: Vec<Irradiance>,
+}
+
+/// A system with its solution.
+struct Solved {
+    assembly: Assembly,
+    solution: Solution,
+    ledger: Ledger,
+}
+
+impl Solved {
+    fn new(
+        world: &World,
+        patches: &Patches,
+        config: &RadiosityConfig,
+    ) -> Result<Self, SystemError> {
+        let assembly = Assembly::new(world, patches, config);
+        let system = assembly.system()?;
+        let solution = solvers::jacobi(&system, &config.solver, solvers::no_progress);
+        let ledger = assembly.ledger(&system, &solution);
+        Ok(Self {
+            assembly,
+            solution,
+            ledger,
+        })
+    }
+
+    fn against(&self, parents: &[PatchId]) -> Against {
+        let unknowns: Vec<u32> = parents
             .iter()
             .flat_map(|&parent| Class::all().map(|class| unknown(parent, class) as u32))
             .collect();
-        let d = error::coarsening(
-            &cast.rows,
-            &classes,
-            areas,
+        let Assembly {
+            cast,
             reflectance,
-            &solution.radiosity,
-        );
-        patches
-            .ids()
-            .map(|patch| {
-                let own = Class::all().map(|class| unknown(patch, class));
-                let area: f64 = own.iter().map(|&u| areas[u]).sum();
-                let sum: Irradiance = own.iter().map(|&u| d[u] * areas[u]).sum();
-                // A patch inside a solid has no share of its area.
-                if area > 0.0 {
-                    sum * (1.0 / area)
-                } else {
-                    Irradiance::ZERO
-                }
-            })
-            .collect()
-    });
-    Ok(RadiositySolution {
-        irradiance: vec![assembly.with_direct(&solution.irradiance)],
-        bounces: Bounces::All,
-        coarsening,
-        outcome: solution.outcome,
-        iterations: solution.iterations,
-        residual: solution.residual,
-        error_bound: solution.error_bound,
-        ledger: assembly.ledger(&system, &solution),
-        row_rays: assembly.cast.cast_rays,
-        buried_points: assembly.cast.buried_points,
-        rays: assembly.cast.weights,
-    })
+            areas,
+            ..
+        } = &self.assembly;
+        let radiosity = &self.solution.radiosity;
+        let differences = error::coarsening(&cast.rows, &unknowns, areas, reflectance, radiosity);
+        Against {
+            unknowns,
+            differences,
+        }
+    }
+
+    fn finish(self) -> RadiositySolution {
+        let Self {
+            assembly,
+            solution,
+            ledger,
+        } = self;
+        RadiositySolution {
+            irradiance: vec![assembly.with_direct(&solution.irradiance)],
+            bounces: Bounces::All,
+            coarsening: Vec::new(),
+            coarse: Vec::new(),
+            outcome: solution.outcome,
+            iterations: solution.iterations,
+            residual: solution.residual,
+            error_bound: solution.error_bound,
+            ledger,
+            row_rays: assembly.cast.cast_rays,
+            buried_points: assembly.cast.buried_points,
+            rays: assembly.cast.weights,
+        }
+    }
 }
 
 /// Emission that rays find (rather than shadow rays), per unknown.

@@ -53,6 +53,7 @@ pub fn solve_partial(
         irradiance,
         bounces: Bounces::AtMost(bounces - 1),
         coarsening: Vec::new(),
+        coarse: Vec::new(),
         outcome: Outcome::Converged,
         iterations: solution.iterations,
         residual: solution.residual,

@@ -69,13 +69,13 @@ pub(super) fn prepare<'w, 's>(
 ) -> Result<Option<Prepared<'w, 's>>, Failure> {
     let seed = context.common.seed;
     let mut steering = Steering::new(context, goal);
-    let scene = Adapted::new(world, bounces, seed)?;
     let mut config = gather::Config {
         rays: GATHER_RAYS,
         shadow_rays: SHADOW_RAYS,
         seed,
     };
     let seen = first_hits(world, frame);
+    let scene = Adapted::new(world, &seen, bounces, seed)?;
     if goal.is_none() || seen.is_empty() {
         let solved = scene.solve(GATHER_PATCHES, &mut steering)?;
         return Ok(solved.map(|lookup| Prepared {

@@ -95,7 +95,7 @@ impl Task<'_> {
     /// Solves once by the given budget, or in rounds until the goal is met.
     pub(super) fn run(&self, world: &World<'_>, context: &Context<'_>) -> Result<Solved, Failure> {
         let density = match self.size {
-            None => Some(pilot::density(world, context.common.seed)?),
+            None => Some(pilot::density(world, &[], context.common.seed)?),
             Some(_) => None,
         };
         if let Some(rays) = self.rays {
