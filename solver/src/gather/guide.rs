@@ -256,7 +256,28 @@ fn spread(lesson: &Lesson) -> [f64; SIDE * SIDE] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::adaptive::{Adapted, Control, Stage as Work};
+    use crate::bounces::Bounces;
+    use crate::gather::{Components, ErrorParts, GatherConfig, SkyRays, Tally, gather_guided};
+    use luxel_scenes::generate;
     use proptest::prelude::*;
+
+    /// A control that lets all work be done.
+    struct Unlimited;
+
+    impl Control for Unlimited {
+        fn begin(&mut self, _what: Work, _cost: f64, _parts: usize) -> f64 {
+            1.0
+        }
+
+        fn advance(&mut self) -> bool {
+            true
+        }
+
+        fn suits(&mut self, _parts: &ErrorParts) -> bool {
+            true
+        }
+    }
 
     proptest! {
         /// The map is one of the square onto itself: the weights times any function add up to its integral. The grid has
@@ -310,5 +331,63 @@ mod tests {
                 weight <= 2.0 * 1.001
             });
         }
+    }
+
+    /// Guided rays find the same light, with less noise. Each receiver's difference has the sum of both variances, of 3
+    /// degrees of freedom each; their sum over 200 receivers is nearly normal: 4.5 of its standard deviations.
+    #[test]
+    fn guided_rays_find_the_same_light_with_less_noise() {
+        let scene = generate::cornell_box();
+        let world = World::new(&scene);
+        let adapted = Adapted::new(&world, &[], Bounces::All, 1).expect("a scene");
+        let lookup = adapted
+            .solve(400, &mut Unlimited)
+            .expect("solves")
+            .expect("unlimited");
+        let positions: Vec<DVec3> = (0..200)
+            .map(|i| {
+                DVec3::new(
+                    0.05 + 0.022 * f64::from(i % 20),
+                    0.0,
+                    0.03 + 0.01 * f64::from(i / 20),
+                )
+            })
+            .collect();
+        let receivers = world.receivers(&positions, &vec![DVec3::Y; positions.len()]);
+        let keys: Vec<Key> = (0..200).map(Key::of).collect();
+        let guides = Guides::learn(&world, &lookup, &receivers, 1);
+        let gather = |guides, seed| {
+            let config = GatherConfig {
+                rays: 64,
+                rays_before: 0,
+                shadow_rays: 0,
+                sky: SkyRays::Gather,
+                gathers: 4,
+                solutions: Solutions::All,
+                components: Components::Indirect,
+                seed,
+            };
+            gather_guided(&world, Some(&lookup), guides, &receivers, &keys, &config)
+        };
+        let (even, guided) = (gather(None, 1), gather(Some(&guides), 2));
+        let sums = |tallies: &[Tally]| {
+            let (mut light, mut variance) = (0.0, 0.0);
+            for tally in tallies {
+                let of_gather = tally
+                    .indirect
+                    .map(|sum| sum.element_sum() / f64::from(tally.rays));
+                let mean = of_gather.iter().sum::<f64>() / 4.0;
+                light += mean;
+                variance += of_gather.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 12.0;
+            }
+            (light, variance)
+        };
+        let ((light, variance), (guided_light, guided_variance)) = (sums(&even), sums(&guided));
+        let z = (light - guided_light) / (variance + guided_variance).sqrt();
+        assert!(z.abs() < 4.5, "{light} and {guided_light}: {z}");
+        assert!(
+            guided_variance < 0.8 * variance,
+            "{guided_variance} and {variance}"
+        );
     }
 }
