@@ -8,6 +8,10 @@ use luxel_tests::cases::{ambient_occlusion, irradiance_fields};
 /// Seeds over which the sampling part is compared with the scatter.
 const NOISE_SEEDS: u64 = 200;
 
+/// The same of films that took one round of samples where the noise was: what they state is nearest to what is allowed there, and
+/// 200 seeds know that ratio to some 0.03 only (1.255, 1.222 and 1.247 from 200, 400 and 1000 seeds).
+const ONE_ROUND_SEEDS: u64 = 1000;
+
 /// Seeds of the closed forms: some 55 of their values a seed are sampled, and 500 are needed to tell a
 /// share of 98.5 % from 99.9 % with three standard deviations.
 const EXACT_SEEDS: u64 = 10;
@@ -89,9 +93,9 @@ fn noise_scatters_as_much_as_it_says() {
 /// agree: sampling that ends where replicates agree by chance would be biased.
 #[test]
 fn pixels_scatter_as_much_as_they_say() {
-    let pixels = |spread| noise::pixels(NOISE_SEEDS, spread);
-    let even = [16, 64].map(|samples| pixels(Spread::Even(samples)));
-    let spread = [1, 3].map(|rounds| pixels(Spread::WhereNoisy { rounds }));
+    let even = [16, 64].map(|samples| noise::pixels(NOISE_SEEDS, Spread::Even(samples)));
+    let spread = [(1, ONE_ROUND_SEEDS), (3, NOISE_SEEDS)]
+        .map(|(rounds, seeds)| noise::pixels(seeds, Spread::WhereNoisy { rounds }));
     for found in even.iter().chain(&spread) {
         assert!((0.8..=1.25).contains(&found.z_squared), "{found:?}");
         assert!(found.variance_ratio < 1.25, "{found:?}");
